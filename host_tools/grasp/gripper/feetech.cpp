@@ -213,6 +213,11 @@ GripperStatus FeetechGripper::poll() {
   const auto magnitude = [&](Address address) { return word(table, at(address)) & (SIGN - 1); };
   const int position = word(table, at(PRESENT_POSITION));
   const double count = (position & SIGN) ? -magnitude(PRESENT_POSITION) : position;
+  if (count < 0.0 || count >= COUNTS_PER_TURN) {
+    throw Error(ErrorCode::gripper_refused,
+                way_.port + ": position " + fixed(count, 0) + " is not one of 0 to " + fixed(COUNTS_PER_TURN - 1, 0) +
+                    ": the servo is a turn off, or in multi-turn mode; its width is unknown");
+  }
   GripperStatus status;
   status.host_us = (began_us + steady_now_us()) / 2;
   active_ = table[at(TORQUE_ENABLE)] != 0;

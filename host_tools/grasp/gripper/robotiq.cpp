@@ -10,6 +10,7 @@
 #include <cmath>
 #include <modbus.h>
 #include <optional>
+#include <unistd.h>
 #include <utility>
 
 namespace fingertip {
@@ -87,6 +88,8 @@ std::array<std::uint16_t, 3> registers_of(const Bytes &answer, int count) {
   return registers;
 }
 
+constexpr int CRC = 2;
+
 std::uint16_t share(double value, double least, double most) {
   const double clamped = std::clamp(value, least, most);
   return static_cast<std::uint16_t>(std::lround((clamped - least) / (most - least) * 255.0));
@@ -115,18 +118,52 @@ RobotiqGripper::RobotiqGripper(const GripperWay &given)
   modbus_set_response_timeout(modbus_, timeout_us / 1'000'000, timeout_us % 1'000'000);
   modbus_set_byte_timeout(modbus_, 0, GAP_us);
   try {
-    try {
-      read_status();
-    } catch (const Error &error) {
-      if (error.code() == ErrorCode::gone) {
-        throw;
+    for (const int function : {4, 3}) {
+      read_function_ = function;
+      try {
+        meet();
+        return;
+      } catch (const Error &error) {
+        if (function == 3 || error.code() == ErrorCode::gone) {
+          throw;
+        }
       }
-      read_function_ = 3;
-      read_status();
     }
   } catch (...) {
     modbus_free(modbus_);
     throw;
+  }
+}
+
+// Some adapters hear themselves: the question comes back before the answer.
+void RobotiqGripper::meet() {
+  try {
+    read_status();
+  } catch (const Error &error) {
+    if (error.code() != ErrorCode::gripper_garbled) {
+      throw;
+    }
+    echoes_ = true;
+    try {
+      read_status();
+    } catch (const Error &) {
+      echoes_ = false;
+      throw error;
+    }
+  }
+}
+
+void RobotiqGripper::drop_echo(std::size_t length, HostTime until) {
+  for (std::uint8_t byte = 0; length > 0; length--) {
+    pollfd coming = {line_.descriptor(), POLLIN, 0};
+    while (wait_for(&coming, 1, until) == 0) {
+      if (host_now() >= until) {
+        throw gripper_error(way_, ETIMEDOUT);
+      }
+    }
+    if (::read(line_.descriptor(), &byte, 1) != 1) {
+      throw gripper_error(way_, EIO);
+    }
   }
 }
 
@@ -156,7 +193,9 @@ HostTime RobotiqGripper::ask(const Bytes &request) {
   if (modbus_send_raw_request(modbus_, asked.data(), static_cast<int>(asked.size())) < 0) {
     throw gripper_error(way_, errno);
   }
-  return HostTime(std::chrono::microseconds(began_us_)) + timeout();
+  const HostTime until = HostTime(std::chrono::microseconds(began_us_)) + timeout();
+  drop_echo(echoes_ ? asked.size() + CRC : 0, until);
+  return until;
 }
 
 RobotiqGripper::Bytes RobotiqGripper::hear(const Bytes &request, std::size_t length, HostTime until) {
@@ -171,7 +210,7 @@ RobotiqGripper::Bytes RobotiqGripper::hear(const Bytes &request, std::size_t len
   if (size < 0) {
     throw gripper_error(way_, errno);
   }
-  constexpr int EXCEPTION = 0x80, HEAD = 2, CRC = 2;
+  constexpr int EXCEPTION = 0x80, HEAD = 2;
   if (size == 0 || answer[0] != way_.slave) {
     throw gripper_error(way_, EMBBADSLAVE);
   }

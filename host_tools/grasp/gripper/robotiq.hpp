@@ -46,6 +46,8 @@ private:
   Bytes read_request(int count) const;
   std::chrono::microseconds timeout() const;
   void make_sure();
+  void meet(); // the first question, which finds an echo
+  void drop_echo(std::size_t length, HostTime until);
   Registers read(int count);
   GripperStatus read_status();
   GripperStatus status_of(const Registers &registers);
@@ -59,6 +61,7 @@ private:
   bool both_at_once_ = true; // function 23
   int both_failed_ = 0;      // failures of both in a row, while neither has ever worked
   bool both_worked_ = false;
+  bool echoes_ = false;
   bool doubtful_ = false;              // an answer may still come that is not expected
   int sure_count_ = 0;                 // registers that make_sure has asked for, 0: none yet,
   HostTime sure_until_{};              // and still waits for

@@ -172,8 +172,8 @@ TEST(test_what_stands_off_at_a_touch_fades_in_the_contact) {
   }
 }
 
-/* The sd of what rubber keeps: of a hold as it grows, of all that is let go, and then less in 3 s. A sensor that stood off by
- * a tenth counts for more from then on, one that did not for less. */
+/* The sd of what rubber keeps: of a hold as it grows, of all that is let go, and then less in 3 s. A sensor that stood
+ * off by a tenth counts for more from then on, one that did not for less. */
 TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin_calm(periods_us[i]);

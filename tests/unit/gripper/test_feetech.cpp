@@ -168,6 +168,13 @@ TEST(FeetechFrames, NoLateAnswerIsTakenForThatToTheNextQuestion) {
   EXPECT_EQ(tape.complaint(), "");
 }
 
+TEST(FeetechFrames, APositionOutsideOfATurnIsRefused) {
+  for (const int position : {6396, 0x8005}) {
+    Tape tape({{text(ASK_TABLE), text(table())}, {text(ASK_STATUS), text(status(position))}});
+    EXPECT_EQ(code_of([&] { opened(MODEL, tape.port()); }), ErrorCode::gripper_refused);
+  }
+}
+
 TEST(Feetech, RefusesWhatCannotBe) {
   Served simulated(served(MODEL));
   const auto code = [&](GripperWay way) {

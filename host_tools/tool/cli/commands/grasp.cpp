@@ -542,7 +542,8 @@ void add_grasp(CommandLine &line) {
   with_presets(command, options->breaking);
   with_limits(command, options->limits);
   command->footer(
-      "Keys, on a terminal: q end, holding; o open; h hold; g grasp; p place; r hand over.\n\nExit status:\n  0  as asked, the gripper "
+      "Keys, on a terminal: q end, holding; o open; h hold; g grasp; p place; r hand over.\n\nExit status:\n  0  as "
+      "asked, the gripper "
       "holding or open\n  1  an error, which is named\n  2  wrong usage\n  3  it closed, and nothing was there\n  4  "
       "the object fell\n  5  the gripper failed, was not active, or did not answer at the end");
 }

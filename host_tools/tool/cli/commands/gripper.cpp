@@ -160,6 +160,9 @@ void check_range(const char *name, double value, double least, double most, cons
   }
 }
 
+// Of the width at the end of a move; the ends differ from one gripper to the next.
+constexpr double SLACK_mm = 1.0, END_SLACK_mm = 5.0;
+
 int move(Gripper &gripper, const GripperOptions &options) {
   const GripperTraits &traits = gripper.traits();
   const double width_mm = options.action == "open"    ? traits.stroke_mm
@@ -192,6 +195,10 @@ int move(Gripper &gripper, const GripperOptions &options) {
   }
   if (end.object.value_or(false)) {
     std::printf("holds an object at %s, asked for %s\n", mm(end.width_mm).c_str(), mm(width_mm).c_str());
+  } else if (const bool at_end = width_mm <= 0.0 || width_mm >= traits.stroke_mm;
+             std::abs(end.width_mm - width_mm) > (at_end ? END_SLACK_mm : SLACK_mm) + traits.deadband_mm) {
+    throw Error("the gripper stopped at " + mm(end.width_mm) + ", not at " + mm(width_mm) +
+                ", and reports neither an object nor a fault");
   } else {
     std::printf("at %s, without an object\n", mm(end.width_mm).c_str());
   }
