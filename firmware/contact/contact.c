@@ -19,10 +19,14 @@ static bool shows_motion(const struct contact_input *input, uint32_t flags) {
          input->fit->location_noise_mm <= CONTACT_JITTER_MAX_mm;
 }
 
-struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit) {
-  struct contact_force weighed = {settings->force_scale * fit->force_N, 0.0f};
+struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit,
+                                   float largest_Pa) {
+  const bool exceeds = (fit->flags & CONTACT_FLAG_AT_BOUND) && fit->p0_Pa > largest_Pa;
+  const float share = exceeds ? largest_Pa / fit->p0_Pa : 1.0f, force_N = share * fit->force_N;
+  struct contact_force weighed = {settings->force_scale * force_N, 0.0f};
   if (fit->flags & CONTACT_FLAG_UNCERTAINTY_VALID) {
-    weighed.force_sd_N = fit_quadrature(settings->force_scale, fit->force_sd_N, settings->force_scale_sd, fit->force_N);
+    weighed.force_sd_N =
+        fit_quadrature(settings->force_scale, share * fit->force_sd_N, settings->force_scale_sd, force_N);
   }
   return weighed;
 }

@@ -263,9 +263,7 @@ void tangential_update(struct tangential_history *history, const struct tangenti
   }
   const float size_N = fit_quadrature(fabsf(qx_N), 1.0f, fabsf(qy_N), 1.0f);
   const float scale = settings->force_scale * settings->tangential_scale;
-  /* Both scales' share of the standard deviation, along the tangential force, where it is the whole. */
-  const float scale_sd = fit_quadrature(settings->force_scale, settings->tangential_scale_sd,
-                                        settings->tangential_scale, settings->force_scale_sd);
+  const float scale_sd = settings->force_scale * settings->tangential_scale_sd;
   force->x_mm = found->x_mm;
   force->y_mm = found->y_mm;
   force->location_sd_mm = found->location_sd_mm;

@@ -39,12 +39,14 @@ struct tangential_history {
 
 /* All zeros unless TANGENTIAL_VALID. The place is the mean of that of a contact that is pulled as
  * estimated and of one that nothing pulls, each by how likely it is: a small tangential force may be none, and
- * chance tangential forces would move it. location_sd_mm has what lies between the two. */
+ * chance tangential forces would move it. location_sd_mm has what lies between the two. The tangential force itself is
+ * reported as estimated, however small: its mean is right, and who controls by it has q_sd_N. Pictures draw one from
+ * two standard deviations on. */
 struct tangential_force {
   float x_mm, y_mm, location_sd_mm;
   float force_N, force_sd_N;
   float qx_N, qy_N; /* of the object on the rubber */
-  float q_sd_N;     /* of either, those of the scales in it */
+  float q_sd_N;     /* of either where force_N is right: q_sd_N over force_N is that of the ratio */
   float ratio;      /* |Q| / F */
 };
 

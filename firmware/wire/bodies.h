@@ -138,11 +138,15 @@ struct wire_contact {
   float y_mm; /* location along the strips */
   float p0_Pa; /* peak of the fitted Gaussian */
   float sigma_mm; /* standard deviation of the fitted Gaussian */
-  float force_N; /* force scale times 2 pi p0 sigma^2, paper eq. (4); positive: pressing */
+  /* force scale times 2 pi p0 sigma^2, paper eq. (4), where AT_BOUND with at most the largest
+   * reading for p0; positive: pressing */
+  float force_N;
   float residual_rms_Pa; /* root mean square of the residuals of the fit */
   /* UNCERTAINTY_VALID */
   float location_sd_mm; /* predicted radial standard deviation of the location */
-  float force_sd_N; /* predicted standard deviation of the force, with that of the force scale */
+  /* predicted standard deviation of the force, with that of the force scale: 0.8 of the force on
+   * a pad that was never calibrated with a weight */
+  float force_sd_N;
   /* SLIP_VALID */
   float slip_mm; /* slip distance, paper eq. (7): from the mean location over the slip window */
   /* WIDTHS_VALID */
@@ -152,7 +156,9 @@ struct wire_contact {
   /* TANGENTIAL_VALID */
   float qx_N; /* tangential force of the object on the rubber, along x */
   float qy_N; /* tangential force along y */
-  float q_sd_N; /* predicted standard deviation of either, with those of the scales */
+  /* predicted standard deviation of either where force_N is right, with that of the tangential
+   * scale */
+  float q_sd_N;
   float tangential_ratio; /* size of the tangential force over force_N */
   /* VELOCITY_VALID */
   float vx_mm_s; /* velocity of the contact along x */

@@ -16,7 +16,7 @@ board=$($python host_tools/report/shared/boards.py | sed -n 1p) # the fastest
 seconds=14 # three slips: at 20, 50 and 100 mm/s
 rubber=000000000000B0BB
 raw=000000000000BA5E # the same rubber, never calibrated
-pad="--layer 12 --effects gain=5,relaxation --seed 3"
+pad="--layer 12 --effects gain=5,relaxation,memory,aftereffect --seed 3"
 weight_N=3
 grasp_seed=2022 # was chosen before its grasp was seen, and chose nothing
 rm -rf $out
@@ -107,10 +107,11 @@ for name in rubber raw; do
   [ $name = rubber ] && serial=$rubber || serial=$raw
   $python host_tools/python evaluate $out/recording.csv $out/lime.csv --device "$serial" --run $out/$name.json -o $out/$name.summary.json
 done
-$python host_tools/python plot $out/recording.csv --device $rubber --truth $out/lime.csv --run $out/rubber.json --beside $raw --beside-run $out/raw.json \
+$python host_tools/python plot $out/recording.csv --device $rubber --truth $out/lime.csv --run $out/rubber.json --beside $raw --beside-name "never calibrated" \
+  --beside-run $out/raw.json \
   -o $out/demo.png
 $python host_tools/demo/errors.py "never calibrated=$out/raw.summary.json" "calibrated=$out/rubber.summary.json"
-echo "The rubber's sensors differ by 5 %, it relaxes, and a lime's pressure is no Gaussian."
+echo "The rubber's sensors differ by 5 %, it relaxes and remembers, and a lime's pressure is no Gaussian."
 echo "picture: $out/demo.png"
 
 echo "== two fingertips on a gripper lift an object: a grasp of kind usual; the firmware on the host, all else simulated"

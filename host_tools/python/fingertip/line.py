@@ -236,13 +236,15 @@ class Contact(NamedTuple):
     sigma_mm: Annotated[float, Wire("f", when=("flags", Flag.FIT_VALID), absent=math.nan)]
     """standard deviation of the fitted Gaussian"""
     force_N: Annotated[float, Wire("f", when=("flags", Flag.FIT_VALID), absent=math.nan)]
-    """force scale times 2 pi p0 sigma^2, paper eq. (4); positive: pressing"""
+    """force scale times 2 pi p0 sigma^2, paper eq. (4), where AT_BOUND with at most the largest reading for p0; positive: pressing"""
     residual_rms_Pa: Annotated[float, Wire("f", when=("flags", Flag.FIT_VALID), absent=math.nan)]
     """root mean square of the residuals of the fit"""
     location_sd_mm: Annotated[float, Wire("f", when=("flags", Flag.UNCERTAINTY_VALID), absent=math.nan)]
     """predicted radial standard deviation of the location"""
     force_sd_N: Annotated[float, Wire("f", when=("flags", Flag.UNCERTAINTY_VALID), absent=math.nan)]
-    """predicted standard deviation of the force, with that of the force scale"""
+    """predicted standard deviation of the force, with that of the force scale: 0.8 of the force on a pad that was never calibrated with a
+    weight
+    """
     slip_mm: Annotated[float, Wire("f", when=("flags", Flag.SLIP_VALID), absent=math.nan)]
     """slip distance, paper eq. (7): from the mean location over the slip window"""
     sigma_x_mm: Annotated[float, Wire("f", when=("flags", Flag.WIDTHS_VALID), absent=math.nan)]
@@ -256,7 +258,7 @@ class Contact(NamedTuple):
     qy_N: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
     """tangential force along y"""
     q_sd_N: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
-    """predicted standard deviation of either, with those of the scales"""
+    """predicted standard deviation of either where force_N is right, with that of the tangential scale"""
     tangential_ratio: Annotated[float, Wire("f", when=("flags", Flag.TANGENTIAL_VALID), absent=math.nan)]
     """size of the tangential force over force_N"""
     vx_mm_s: Annotated[float, Wire("f", when=("flags", Flag.VELOCITY_VALID), absent=math.nan)]
@@ -750,7 +752,7 @@ class ContactQuantities:
 
     @property
     def force_N(self) -> float:
-        """Force scale times 2 pi p0 sigma^2, paper eq. (4); positive: pressing."""
+        """Force scale times 2 pi p0 sigma^2, paper eq. (4), where AT_BOUND with at most the largest reading for p0; positive: pressing."""
         return self.contact.force_N
 
     @property
@@ -765,7 +767,9 @@ class ContactQuantities:
 
     @property
     def force_sd_N(self) -> float:
-        """Predicted standard deviation of the force, with that of the force scale."""
+        """Predicted standard deviation of the force, with that of the force scale: 0.8 of the force on a pad that was never calibrated with
+        a weight.
+        """
         return self.contact.force_sd_N
 
     @property
@@ -800,7 +804,7 @@ class ContactQuantities:
 
     @property
     def q_sd_N(self) -> float:
-        """Predicted standard deviation of either, with those of the scales."""
+        """Predicted standard deviation of either where force_N is right, with that of the tangential scale."""
         return self.contact.q_sd_N
 
     @property

@@ -172,7 +172,7 @@ class Beside:
     def __init__(self, options, truth):
         recording = of_device(options, options.beside, COMPARED_COLUMNS)
         check_time(recording)
-        self.serial, self.comparison = options.beside, Comparison(recording, truth, read_run(options.beside_run))
+        self.name, self.comparison = options.beside_name or options.beside, Comparison(recording, truth, read_run(options.beside_run))
         rows = recording.has_contact
         self.t_s = self.comparison.t_s
         self.good = recording.flag(FIT_VALID)[rows] & ~recording.flag(WARNINGS)[rows]
@@ -191,7 +191,7 @@ def draw_over_time(axes, t_s, restarts_s, series, good, doubtful, slip, truth, b
                 panel.axvspan(start, end, color=SLIPPING, alpha=0.10, lw=0, zorder=0)
         if beside:
             values_beside = gaps_as_nan(beside.t_s, beside.values[name], beside.good)
-            panel.plot(beside.t_s, values_beside, color=ALONG_Y, lw=1.1, ls="--", label=beside.serial, zorder=1.5)
+            panel.plot(beside.t_s, values_beside, color=ALONG_Y, lw=1.1, ls="--", label=beside.name, zorder=1.5)
         panel.plot(t_s, gaps_as_nan(t_s, values, good), color=MEASURED, lw=1.1, label="measured", zorder=2)
         draw_doubtful(panel, t_s, [values], doubtful, scales=not good.any() and truth is None)
         panel.set_xlim(t_s[0], t_s[-1])
@@ -315,13 +315,12 @@ def header(recording, comparison, t_s, simulated, beside):
     if comparison:
         s = comparison.summary
         lines.append(
-            f"{s['frames']} frames at {s['frames_per_s']:.1f}/s  ·  {compared_in_words(s)}  ·  slips: {s['slip_found']} found, {s['slip_missed']} missed, "
-            f"{s['slip_false']} false frames  ·  "
+            f"{compared_in_words(s)}  ·  slips: {s['slip_found']} found, {s['slip_missed']} missed, {s['slip_false']} false frames  ·  "
             + (f"Q/F: median {s['tangential_ratio_error_p50']:.3f}  ·  " if s["tangential_frames"] else "")
             + f"dropped packets: {'?' if s['dropped_packets'] is None else s['dropped_packets']}"
         )
         if beside:
-            lines.append(f"{beside.serial}, dashed  ·  {compared_in_words(beside.comparison.summary)}")
+            lines.append(f"{beside.name}, dashed  ·  {compared_in_words(beside.comparison.summary)}")
     else:
         dropped = (recording.end or {}).get("dropped_packets", "?")
         lines.append(f"{len(recording.has_contact)} frames in {t_s[-1] - t_s[0]:.1f} s  ·  dropped packets: {dropped}")
@@ -335,6 +334,7 @@ def main(argv):
     parser.add_argument("--run", metavar="run.json", help="the emulator's report: the recording is of simulated sensors")
     parser.add_argument("-o", "--output", required=True, metavar="FILE.png")
     parser.add_argument("--beside", metavar="SERIAL", help="another fingertip of the recording with the same scenario; with --truth")
+    parser.add_argument("--beside-name", metavar="WORDS", help="what it is called in the picture; default: its serial number")
     parser.add_argument("--beside-run", metavar="run.json", help="the emulator's report of that one")
     add_recording_options(parser)
     options = parser.parse_args(argv)

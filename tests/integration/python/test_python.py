@@ -458,13 +458,13 @@ class TangentialLoad(ToolTest):
         one = self.recording(scenario)
         self.assertIn("--beside compares with a truth", self.error("plot", one, "--beside", "AAAA", "-o", self.folder / "p.png"))
         load = lambda options, **how: files.read_recording(other if options.device == "BBBB" else one)
-        beside = ("--beside", "BBBB", "--beside-run", self.run_report())
+        beside = ("--beside", "BBBB", "--beside-name", "never calibrated", "--beside-run", self.run_report())
         with mock.patch.object(plot, "load_recording", load):
             panels = self.panels(one, "--truth", scenario, "--run", self.run_report(), *beside)
         drawn = {line.get_label(): np.nanmax(line.get_ydata()) for line in panels["force, N"].lines if len(line.get_ydata())}
-        self.assertAlmostEqual(drawn["BBBB"], 0.8 * drawn["measured"], delta=0.01 * drawn["measured"])
+        self.assertAlmostEqual(drawn["never calibrated"], 0.8 * drawn["measured"], delta=0.01 * drawn["measured"])
         texts = " ".join(text.get_text() for text in panels["force, N"].figure.texts)
-        self.assertRegex(texts, r"BBBB, dashed .* force: median 20\.\d\d %")
+        self.assertRegex(texts, r"never calibrated, dashed .* force: median 20\.\d\d %")
 
     def test_without_loads_there_is_no_panel_of_them(self):
         panels = self.panels(self.recording(self.scenario()))

@@ -137,13 +137,13 @@ static uint32_t judge(uint32_t crc) {
   contact_update(&slip_history, &settings, &input, &told.result);
   tangential_update(&tangential_history, &tangential_settings, &input, &told.result, &told.load);
   motion_update(&motion_history, &tangential_settings, &input, &told.result, &told.motion);
-  told.force = contact_weigh(&settings, &fit);
+  told.force = contact_weigh(&settings, &fit, 1e9f);
   return crc32_iso_hdlc((const uint8_t *)&told, sizeof told);
 }
 
 TEST(test_contacts_are_judged_the_same_to_the_bit) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0xE35A249B, 0xE4D248DD, 0x2CB5ACC3, 0x9E97A54A,
-                                                 0xFCA6D2F6, 0x3B725D08, 0xE906CAD0, 0xA03B3BDA};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x4F2A85FB, 0xF6967782, 0x7BE99146, 0x63B55B34,
+                                                 0x8A054821, 0x848E7421, 0x12DA508D, 0xC6562418};
   uint32_t crcs[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x736C6964));
   for (int i = 0; i < COURSES; i++) {

@@ -211,9 +211,8 @@ TEST(scales_and_their_uncertainties_enter) {
   TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.2f, 0.2f, load.force_sd_N); /* 0.16 and 0.12 */
   TEST_ASSERT_EQUAL_FLOAT(0.75f, load.qx_N);                      /* 1.25 times 0.8 is 1 */
   TEST_ASSERT_EQUAL_FLOAT(-1.0f, load.qy_N);
-  /* Of 1.25 N: 0.05 / 0.8 and 0.03 / 1.25. */
-  const float of_scales = 1.25f * sqrtf(0.0625f * 0.0625f + 0.024f * 0.024f);
-  const float expected = sqrtf(0.04f * 0.04f + of_scales * of_scales);
+  const float of_scale = 1.25f * 0.05f / 0.8f; /* of 1.25 N; that of the force is in the force's */
+  const float expected = sqrtf(0.04f * 0.04f + of_scale * of_scale);
   TEST_ASSERT_FLOAT_WITHIN(0.002f * expected, expected, load.q_sd_N);
   TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.25f, 0.25f, load.ratio);
 }

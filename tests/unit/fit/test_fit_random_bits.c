@@ -445,7 +445,7 @@ static void fit_any(uint32_t number, const struct input *input, bool begins) {
   contact_update(&tip.slip, &scales, &of_frame, &result);
   tangential_update(&tip.history, &tip.scales, &of_frame, &result, &force);
   motion_update(&tip.motion, &tip.scales, &of_frame, &result, &motion);
-  const struct contact_force weighed = contact_weigh(&scales, &fit);
+  const struct contact_force weighed = contact_weigh(&scales, &fit, 1e9f);
   const bool has_force = result.flags & CONTACT_FLAG_TANGENTIAL_VALID;
   const struct shapes_place place = shapes_locate(&tip.shapes.report, &fit, has_force ? &force : NULL);
   fit_doubt_follow(&tip.doubt, input->array, readings, settings, &fit);

@@ -201,13 +201,13 @@ export interface Contact extends Header {
   p0_Pa: number;
   /** standard deviation of the fitted Gaussian */
   sigma_mm: number;
-  /** force scale times 2 pi p0 sigma^2, paper eq. (4); positive: pressing */
+  /** force scale times 2 pi p0 sigma^2, paper eq. (4), where AT_BOUND with at most the largest reading for p0; positive: pressing */
   force_N: number;
   /** root mean square of the residuals of the fit */
   residual_rms_Pa: number;
   /** predicted radial standard deviation of the location */
   location_sd_mm: number;
-  /** predicted standard deviation of the force, with that of the force scale */
+  /** predicted standard deviation of the force, with that of the force scale: 0.8 of the force on a pad that was never calibrated with a weight */
   force_sd_N: number;
   /** slip distance, paper eq. (7): from the mean location over the slip window */
   slip_mm: number;
@@ -221,7 +221,7 @@ export interface Contact extends Header {
   qx_N: number;
   /** tangential force along y */
   qy_N: number;
-  /** predicted standard deviation of either, with those of the scales */
+  /** predicted standard deviation of either where force_N is right, with that of the tangential scale */
   q_sd_N: number;
   /** size of the tangential force over force_N */
   tangential_ratio: number;
