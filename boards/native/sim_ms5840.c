@@ -69,6 +69,7 @@ void sim_ms5840_brown_out(struct sim_ms5840 *sensor) {
   sim_ms5840_power_cycle(sensor);
   sensor->loaded = loaded;
   sensor->untrimmed = true;
+  sensor->share = 0.9375;
 }
 
 static void settle(struct sim_ms5840 *sensor, uint64_t t_us) {
@@ -116,7 +117,7 @@ bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_u
     sensor->result = 0;
     sensor->busy_until_us = t_us + duration_us;
     sensor->converted = measure(context, type, rows[row].osr, t_us + duration_us / 2);
-    sensor->converted -= sensor->untrimmed ? sensor->converted / 16 : 0;
+    sensor->converted = sensor->untrimmed ? (uint32_t)ceil(sensor->share * sensor->converted) : sensor->converted;
     return true;
   }
   return is_read_command(command);

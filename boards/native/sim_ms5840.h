@@ -36,6 +36,7 @@ struct sim_ms5840 {
   /* Private */
   bool loaded;    /* has been reset since power-up */
   bool untrimmed; /* has not been reset since a brown-out */
+  double share;   /* of the true codes, that an untrimmed one has */
   bool converting;
   bool spoiled;
   uint64_t busy_until_us; /* end of a reset or a conversion */
@@ -54,7 +55,8 @@ void sim_ms5840_init(struct sim_ms5840 *sensor, const uint16_t c[6]);
 void sim_ms5840_power_cycle(struct sim_ms5840 *sensor);
 
 /* Supply down and up, not as far as that: the sensor goes on converting, but until a reset its
- * codes are 1/16 too small. A conversion is lost. That there are such sensors is assumed. */
+ * codes are 1/16 too small, or as the caller sets .share. A conversion is lost. That there are such
+ * sensors is assumed. */
 void sim_ms5840_brown_out(struct sim_ms5840 *sensor);
 
 /* A command byte that ends at t_us, alone in its transfer or before a read. False: not

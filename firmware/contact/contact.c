@@ -53,13 +53,28 @@ void contact_judge(const struct contact_input *input, struct contact_result *res
   result->flags = flags;
 }
 
+/* A location that other sensors show may be another. One is passed over, a second one begins the history again. */
+static bool is_passed_over(struct slip_history *history, uint32_t used) {
+  const bool stays = used == history->newest;
+  history->newest = used;
+  if (used != history->used && history->count != 0) {
+    if (!stays) {
+      return true;
+    }
+    slip_reset(history);
+  }
+  history->used = used;
+  return false;
+}
+
 void contact_update(struct slip_history *history, const struct contact_settings *settings,
                     const struct contact_input *input, struct contact_result *result) {
   contact_judge(input, result);
   uint32_t flags = result->flags;
   if (!input->fit || !shows_motion(input, flags)) {
     slip_reset(history);
-  } else if (slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm, settings->slip_window_us,
+  } else if (!is_passed_over(history, input->fit->used) &&
+             slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm, settings->slip_window_us,
                          &result->slip_mm)) {
     flags |= CONTACT_FLAG_SLIP_VALID;
     if (result->slip_mm > settings->slip_threshold_mm) {

@@ -25,8 +25,9 @@ static uint32_t size_of(int32_t value) { return (uint32_t)(value ^ -(value < 0))
 
 static int32_t difference(int32_t a, int32_t b) { return (int32_t)((uint32_t)a - (uint32_t)b); }
 
-/* The sensor whose reading has stepped while all others of these did not move, as a bitmap. */
-static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const int32_t last_Pa_q10[]) {
+/* The sensor whose reading has stepped while all others of these did not move, as a bitmap; and all that have fallen.
+ */
+static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const int32_t last_Pa_q10[], uint32_t *fallen) {
   uint32_t stepped = 0;
   uint32_t largest = 0;
   uint32_t second = 0;
@@ -34,7 +35,9 @@ static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const in
     if (!(sensors >> k & 1u)) {
       continue;
     }
-    uint32_t size = size_of(difference(frame->pressure_Pa_q10[k], last_Pa_q10[k]));
+    const int32_t step = difference(frame->pressure_Pa_q10[k], last_Pa_q10[k]);
+    *fallen |= step < -READINGS_JOLT_Pa_q10 ? UINT32_C(1) << k : 0;
+    uint32_t size = size_of(step);
     if (size > largest) {
       second = largest;
       largest = size;
@@ -83,11 +86,14 @@ static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *rea
                                                             int32_t kept_Pa_q10[]) {
   const bool all = usable == all_sensors(frame->sensor_count);
   const uint32_t seen = usable & (readings->has_last | readings->awaited);
-  const uint32_t stepped = readings->presses_are_shared ? find_alone(frame, seen, last_Pa_q10) : 0;
+  uint32_t fallen = 0;
+  uint32_t stepped = find_alone(frame, seen, last_Pa_q10, &fallen);
+  stepped = readings->presses_are_shared ? stepped : 0;
   const uint32_t alone = all ? stepped & readings->has_last : 0;
   readings->restored |= alone | (stepped & readings->awaited);
   readings->awaited &= ~usable;
   judge_alone(readings, alone, frame, last_Pa_q10);
+  readings->jolted |= alone ? 0 : fallen & readings->has_last;
   uint32_t low = 0;
   uint32_t bit = 1;
   for (uint8_t k = 0; k < frame->sensor_count; k++, bit <<= 1) {
@@ -102,7 +108,7 @@ static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *rea
   }
   readings->suspects |= low & readings->was_low;
   readings->was_low = low | (readings->was_low & ~usable);
-  const uint32_t left_out = low | alone;
+  const uint32_t left_out = low | alone | (readings->jolted & usable);
   keep(readings, usable, left_out, last_Pa_q10, kept_Pa_q10);
   return left_out;
 }
@@ -131,7 +137,7 @@ static struct glance compensate(const struct readings *readings, const uint32_t 
 }
 
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good, struct frame *frame) {
-  const uint32_t usable = good & readings->has_thermal & ~readings->suspects;
+  const uint32_t usable = good & readings->has_thermal & ~(readings->suspects | readings->jolted);
   const int32_t *last_Pa_q10 = readings->last_Pa_q10[readings->newest];
   readings->newest ^= 1;
   int32_t *kept_Pa_q10 = readings->last_Pa_q10[readings->newest];

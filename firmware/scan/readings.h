@@ -2,12 +2,9 @@
  * frame's.
  *
  * Temperatures. A temperature may differ by more than READINGS_TEMPERATURE_STEP_MAX_cC from the
- * sensor's last, while the others' have not stepped along. That is no change of temperature. It is
- * used when the next one agrees with it and both are near the other sensors'. Until then the last
- * one stays in use, and the sensor is doubtful: each degree is worth some 240 Pa. A zero measured
- * shortly before is then measured again, for the last temperature may have been wrong
- * (condition.h). Two temperatures that agree with each other, but are near no other sensor's, come
- * from a sensor that has lost its state as its supply failed. It becomes a suspect. The first
+ * sensor's last. That is no change of temperature. The last one stays in use, and the sensor is
+ * doubtful: each degree is worth some 240 Pa. Two of them that agree with each other come from a
+ * sensor that has lost its state as its supply failed. It becomes a suspect. The first
  * temperature of a sensor must be near the others', too. If the sensor reports the same twice
  * before a reset and after each of two, it is believed and stays doubtful. (After one reset it may
  * have lost its state again: supplies that dip once do so twice.)
@@ -17,6 +14,11 @@
  * press. If the next reading is back, that was all. If it stays, still alone, the sensor is a
  * suspect. Steps beside which others move count at once. So does every step while a sensor is
  * missing, since that one may feel it.
+ *
+ * A sensor whose supply dips may lose its state, and go on with codes that are off. Then it reads 0 once where its
+ * conversion was lost, or its pressure falls, and its temperature steps. So one that reads 0, or whose pressure falls
+ * at once with others', is left out until its next temperature, which is asked for at once. If that has stepped from
+ * the sensor's own last it has lost its state, whatever the others do.
  *
  * A suspect is left out until it has been reset and its PROM read again. Then its temperature and
  * its pressure count as its first. Its zero still holds, since it is the same sensor, unless it was
@@ -50,6 +52,8 @@
  * up to 6 mm outside the array, the loneliest moves a neighbour by 64 Pa and 1/160; on 12 mm by
  * 3.1 kPa and a quarter. At 410 frames/s and more none is so fast. */
 #define READINGS_STILL_NOISES 6
+/* From one reading to the next. Codes that are 3 % off make 8 kPa. */
+#define READINGS_JOLT_Pa_q10 (MS58XX_STEP_Pa * 768)
 #define READINGS_ALONE 256
 /* Moulding presses on the sensors: at rest those of four real strips differed by 2 to 12 kPa. A
  * sensitivity that is off by 1 % moves the reading at 1 bar by 2.9 kPa: what is apart by less
@@ -80,6 +84,7 @@ struct readings {
   uint32_t alone;          /* bitmap of one sensor: its last pressure stepped alone, ... */
   int32_t alone_to_Pa_q10; /* ... from last_Pa_q10 to here */
   uint32_t suspects;       /* bitmap: want a reset */
+  uint32_t jolted;         /* bitmap: left out until their temperature shows that they kept their state */
   uint32_t reset_once;     /* bitmap: had one for that reason */
   uint32_t pardoned;       /* bitmap: and another one */
   uint32_t left_out;       /* since start: pressures below zero or that stepped alone */

@@ -8,6 +8,7 @@
 #define TEMPERATURE_INTERVAL_MAX_us (SCAN_TEMPERATURE_INTERVAL_MAX_ms * 1000u)
 /* After a temperature reading that a sensor missed, or one in doubt. */
 #define TEMPERATURE_RETRY_us 100000u
+#define TEMPERATURE_AT_ONCE_us 1u
 /* How soon a temperature that was not taken is tried again. */
 #define SLOT_POLL_us 1000u
 /* How soon a new rate is noticed while waiting for the next frame of the old one. */
@@ -127,6 +128,7 @@ static void end_bring_up(struct scan *scan, uint64_t now_us) {
   scan->returned |= result.admitted & ~get(&scan->admitted);
   set(&scan->admitted, result.admitted);
   set(&scan->prom_bad, result.bad);
+  set(&scan->temperature_within_us, 0); /* the next conversion is one */
   scan->void_next = 0;
   scan->was_zero = 0;
   scan->missed_once = 0;
@@ -161,8 +163,7 @@ static uint32_t judge_answers(struct scan *scan, uint32_t heard, uint32_t zero) 
   scan->was_zero = zero;
   /* What was not read is still there to be read, and the sensor may miss the next command. */
   scan->void_next = single ? 0 : zero | (missed & ~acknowledged);
-  scan->wants_admission = (acknowledged & ~admitted) != 0 || admitted == 0 || (get(&scan->suspects) & admitted) != 0 ||
-                          bring_up_wants_recheck(&scan->bring_up);
+  scan->wants_admission = (acknowledged & ~admitted) != 0 || admitted == 0 || bring_up_wants_recheck(&scan->bring_up);
   count(&scan->counters.zero_readings, count_bits(unusable));
   set(&scan->present, acknowledged);
   set(&scan->admitted, admitted);
@@ -231,6 +232,7 @@ static void take_reading(struct scan *scan, const struct scan_conversion *conver
   }
   slot->conversion = *conversion;
   slot->good = good;
+  slot->zero = scan->was_zero;
   if (conversion->is_temperature) {
     slot->prom_changed = scan->bring_up.changed;
     slot->returned = scan->returned;
@@ -249,7 +251,7 @@ static void obey_wish(struct scan *scan, uint64_t now_us) {
   }
   set(&scan->temperature_within_us, 0);
   if (scan->next_temperature_us > now_us + within_us) {
-    scan->next_temperature_us = now_us + within_us;
+    scan->next_temperature_us = now_us + (within_us & ~TEMPERATURE_AT_ONCE_us);
   }
 }
 
@@ -282,7 +284,8 @@ static void leave_idle(struct scan *scan, uint64_t now_us) {
   }
   /* A temperature that was read just now still has to go into its slot. */
   bool prom_is_free = !temperature_waits(scan) && !scan->last_was_temperature;
-  if (scan->wants_admission && now_us >= scan->bring_up.next_us && prom_is_free) {
+  const bool wants_admission = scan->wants_admission || (get(&scan->suspects) & get(&scan->admitted)) != 0;
+  if (wants_admission && now_us >= scan->bring_up.next_us && prom_is_free) {
     begin_bring_up(scan, now_us);
     return;
   }
@@ -570,8 +573,13 @@ bool scan_take(struct scan *scan, struct frame *frame) {
     return false;
   }
   fill_head(scan, &scan->slot.conversion, frame);
+  const uint32_t jolted = scan->readings.jolted;
+  scan->readings.jolted |= scan->slot.zero;
   if (readings_take_pressures(&scan->readings, scan->slot.code, scan->slot.good, frame)) {
     report(scan);
+  }
+  if (scan->readings.jolted & ~jolted) {
+    set(&scan->temperature_within_us, TEMPERATURE_AT_ONCE_us);
   }
   hand_over(&scan->slot_state, SCAN_SLOT_EMPTY);
   return true;

@@ -97,6 +97,7 @@ struct scan_conversion {
 struct scan_slot {
   struct scan_conversion conversion;
   uint32_t good;                 /* bitmap: the code is a measurement */
+  uint32_t zero;                 /* bitmap: read 0 */
   uint32_t prom_changed;         /* bitmap: another sensor than before. Of a temperature */
   uint32_t returned;             /* bitmap: admitted again, perhaps after long. Of a temperature */
   uint32_t code[FT_MAX_SENSORS]; /* [sensor] 24-bit */

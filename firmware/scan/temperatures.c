@@ -20,7 +20,6 @@ static int16_t clamped_i16(int32_t value) {
 
 /* What the temperatures of the array show about one of them. */
 struct company {
-  int32_t step_cC;   /* that the sensors made together */
   int32_t middle_cC; /* of them now */
   bool votes;
 };
@@ -31,17 +30,8 @@ static struct company keep_company(const struct readings *readings, uint8_t sens
   int32_t values[FT_MAX_SENSORS];
   int count = 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
-    if (good & readings->has_thermal & (UINT32_C(1) << k)) {
-      values[count++] = now_cC[k] - readings->thermal[k].first_order_cC;
-    }
-  }
-  if (count >= VOTERS_MIN) {
-    company.step_cC = apart_median(values, count);
-  }
-  count = 0;
-  for (uint8_t k = 0; k < sensor_count; k++) {
     if (readings->has_thermal & (UINT32_C(1) << k)) {
-      values[count++] = readings->thermal[k].first_order_cC + company.step_cC;
+      values[count++] = readings->thermal[k].first_order_cC;
     } else if (good & (UINT32_C(1) << k)) {
       values[count++] = now_cC[k];
     }
@@ -65,11 +55,9 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const s
     use = near || (agrees && possible && (readings->pardoned & bit));
     insists = agrees && !use;
   } else {
-    bool steps =
-        !within(now_cC - readings->thermal[k].first_order_cC - company->step_cC, READINGS_TEMPERATURE_STEP_MAX_cC);
-    use = !steps || (agrees && near);
-    insists = agrees && !near;
-    readings->restored |= use && steps ? bit : 0;
+    use = within(now_cC - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_STEP_MAX_cC);
+    insists = !use && (agrees || readings->jolted);
+    readings->jolted |= insists && readings->jolted ? bit : 0;
   }
   if (!use) {
     readings->suspects |= insists ? bit : 0;
@@ -83,7 +71,7 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const s
 
 static void forget(struct readings *readings, uint32_t sensors) {
   const uint32_t reset = readings->suspects & sensors;
-  readings->restored |= reset;
+  readings->restored |= reset & ~readings->jolted; /* before a jolt it had its state */
   readings->pardoned = (readings->pardoned & ~sensors) | (readings->reset_once & reset);
   readings->reset_once = (readings->reset_once & ~sensors) | reset;
   readings->has_thermal &= ~sensors;
@@ -96,6 +84,7 @@ static void forget(struct readings *readings, uint32_t sensors) {
   readings->was_low &= ~sensors;
   readings->alone &= ~sensors;
   readings->suspects &= ~sensors;
+  readings->jolted &= ~sensors;
 }
 
 /* Sensors whose PROM has a wrong CRC against the middle of all. */
@@ -204,6 +193,9 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     readings->doubted &= ~bit;
     readings->has_thermal |= bit;
   }
+  readings->has_last &= ~readings->jolted; /* what they read before says no more */
+  readings->jolted &= ~taken->good | readings->suspects;
+  news |= readings->jolted & ~readings->suspects ? READINGS_ASK_AGAIN : 0;
   readings->alike &= taken->admitted & ~taken->prom_changed;
   readings->doubtful =
       taken->prom_bad | readings->doubted | readings->strange | readings->apart | compare(readings, sensor_count);
