@@ -25,6 +25,7 @@ import tty
 PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "host_tools/python"
 sys.path.insert(0, str(PACKAGE))
 from fingertip import wire  # noqa: E402
+from fingertip.files import read_recording, recorded_devices  # noqa: E402
 from fingertip.mcap_recording import McapLineReader  # noqa: E402
 from fingertip.network import Stamp, parts_of  # noqa: E402
 
@@ -79,25 +80,18 @@ class Mirrors:
 
 def recorded_packets(path):
     """Serial number -> (sequence, t_us) of each packet in a recording of several, in the order of the file; and its text lines."""
-    found, names, serials, lines = {}, None, [], []
-    for _, text, _ in McapLineReader(path):
-        if text.startswith("#"):
-            lines.append(text)
-            key, _, value = text[2:].partition(": ")
-            if key == "devices":
-                serials = value.split()
-                found = {serial: [] for serial in serials}
-            elif key.endswith("/packet"):
-                fields = dict(pair.split("=") for pair in value.split()[1:])
-                found[serials[int(key.split("/")[0])]].append((int(fields["sequence"]), int(fields["t_us"])))
-        elif names is None:
-            names = text.split(",")
-        else:
-            row = dict(zip(names, text.split(",")))
-            for name in ("sequence", "raw_sequence"):
-                if row[name]:
-                    found[serials[int(row["device"])]].append((int(row[name]), int(row["t_us"])))
-    return found, lines
+    lines, found = [each for each in McapLineReader(path).items() if type(each) is tuple], {}
+    for number, serial in enumerate(recorded_devices(path)):
+        read, packets = read_recording(path, serial=serial), []
+        for kind, name in enumerate(("sequence", "raw_sequence")):
+            rows = zip(read.line_numbers, read[name], read["t_us"])
+            packets += [(line, kind, (int(sequence), int(t_us))) for line, sequence, t_us in rows if sequence == sequence]
+        for line, text, _ in lines:
+            if text.startswith(f"# {number}/packet: "):
+                fields = dict(pair.split("=") for pair in text.split()[3:])
+                packets.append((line, 0, (int(fields["sequence"]), int(fields["t_us"]))))
+        found[serial] = [packet for _, _, packet in sorted(packets)]
+    return found, [text for _, text, _ in lines]
 
 
 class Network:

@@ -28,7 +28,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
 from fingertip import RecordingWriter, wire  # noqa: E402
 from fingertip.errors import InputError  # noqa: E402
-from fingertip.mcap_recording import McapLineReader, McapLines  # noqa: E402
+from fingertip.mcap_recording import Contacts, McapLineReader, McapLines  # noqa: E402
 from mcap.exceptions import McapError  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
 from mcap.records import Message  # noqa: E402
@@ -293,10 +293,11 @@ def truncations(tool, bag, csv_path, folder, count, seed):
         done = subprocess.run([tool, "convert", cut, out, "--salvage", "--overwrite"], capture_output=True, text=True, timeout=PATIENCE_s)
         read = out.read_bytes().split(b"\n")[:-1] if done.returncode == 0 else []
         try:
-            by_package = [text.encode("utf-8") for _, text, _ in McapLineReader(cut)]
+            items = [each for each in McapLineReader(cut).items() if isinstance(each, tuple)]
+            by_package = [number for each in items for number in (each.numbers if isinstance(each, Contacts) else each[:1])]
         except InputError:
             by_package = []
-        unread += not read == by_package == lines[:there]
+        unread += read != lines[:there] or by_package != list(range(1, there + 1))
         out.unlink(missing_ok=True)
     return unread
 

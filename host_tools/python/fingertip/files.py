@@ -34,13 +34,12 @@ from . import line, recorded
 from .errors import InputError
 from .frames import Edge, frame_of
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
-from .mcap_recording import MAGIC, Damaged, Line, McapLineReader
-from .recorded import Rows, counts_of, judge_key, packet_of
+from .mcap_recording import MAGIC, Contacts, Damaged, Line, McapLineReader
+from .recorded import Array, Rows, counts_of, judge_key, packet_of
 
 if TYPE_CHECKING:
     import pandas
 
-Array = npt.NDArray[np.float64]
 Path = str | os.PathLike[str]
 
 PITCH_mm = 9.0
@@ -328,19 +327,20 @@ class _RecordingLines:
             if isinstance(each, Stretch):
                 for number, text in enumerate(each.texts, each.number):
                     yield number, text, False
-            else:
+            elif not isinstance(each, Contacts):
                 yield each
 
-    def stretches(self) -> Iterator["Line | Damaged | Stretch"]:
+    def stretches(self) -> Iterator["Line | Damaged | Stretch | Contacts"]:
         """The same, but rows, or what else is neither comment nor blank, many at a time."""
         try:
             with open(self.path, "rb") as file:
-                begin = file.read(16384)
-                if begin.startswith(MAGIC):
-                    yield from McapLineReader(self.path, self.progress).lines()
+                start = file.read(16384)
+                if start.startswith(MAGIC):
+                    self.mcap = McapLineReader(self.path, self.progress)
+                    yield from self.mcap.items()
                     return
-                file.seek(3 if begin.startswith(b"\xef\xbb\xbf") else 0)
-                source: Any = file if b"\n" in begin or b"\r" not in begin else io.BytesIO(file.read().replace(b"\r", b"\n"))
+                file.seek(3 if start.startswith(b"\xef\xbb\xbf") else 0)
+                source: Any = file if b"\n" in start or b"\r" not in start else io.BytesIO(file.read().replace(b"\r", b"\n"))
                 size, read, shown, number = os.fstat(file.fileno()).st_size, 0, 0, 1
                 while lines := source.readlines(BLOCK_bytes):
                     block = b"".join(lines)
@@ -457,13 +457,22 @@ class _Reading:
                 damaged(numbers[at], found)
                 at += 1
                 continue
-            if not self.has_info and 1 <= self.info_sensors <= SENSORS_MAX:  # of a recorder that has written none
-                self.packets.append(("info", {"sequence": "0", "t_us": "0"}))
-            self.has_info = True
-            self.table.frombytes((found if self.columns is None else found[:, self.wanted]).tobytes())
-            self.line_numbers.extend(numbers[at : at + len(found)])
-            self.times_us.extend(times_us[at : at + len(found)])
+            self.put(found, numbers[at : at + len(found)], times_us[at : at + len(found)])
             at += len(found)
+
+    def take_contacts(self, numbers: list[int], devices: Array, times_us: Array, table: Array) -> None:
+        """Messages of an MCAP file, as McapLineReader.tables has them."""
+        mine = np.flatnonzero(devices == self.number) if self.is_joint else slice(None)
+        self.put(table[mine], np.array(numbers, "q")[mine].tolist(), times_us[mine].tolist() if self.is_joint else ())
+
+    def put(self, found: Array, numbers: Sequence[int], times_us: Sequence[float]) -> None:
+        if len(found) and not self.has_info:  # of a recorder that has written none
+            self.has_info = True
+            if 1 <= self.info_sensors <= SENSORS_MAX:
+                self.packets.append(("info", {"sequence": "0", "t_us": "0"}))
+        self.table.frombytes((found if self.columns is None else found[:, self.wanted]).tobytes())
+        self.line_numbers.extend(numbers)
+        self.times_us.extend(times_us)
 
     def _comment(self, line: int, text: str) -> None:
         key, separator, value = text[1:].partition(": ")
@@ -536,10 +545,29 @@ def read_recording(
             reading.take_rows(wrong)
             wrong(number, error)
 
-    for each in lines.stretches():
-        if isinstance(each, Damaged):
+    def follow(number: int, to: int) -> None:
+        nonlocal last
+        if last is not None and number > last + 1:
             reading.take_rows(wrong)
+            damaged(
+                InputError(f"{path}:{number}: {number - last - 1} lines are missing before it; use --salvage to go on"), number - last - 1
+            )
+        last = to
+
+    for each in lines.stretches():
+        if isinstance(each, (Damaged, Contacts)):
+            reading.take_rows(wrong)
+        if isinstance(each, Damaged):
             damaged(each, 0)  # the next one's number shows how many lines are lost
+        elif isinstance(each, Contacts):
+            if reading.rows is None:
+                raise InputError(f"{path}: no header line before the rows: of topics alone no recording can be read")
+            for found in lines.mcap.tables(each, reading.rows):
+                if isinstance(found, Damaged):
+                    damaged(found, 0)
+                else:
+                    follow(found[0][0], found[0][-1])
+                    reading.take_contacts(*found)
         elif isinstance(each, Stretch):
             numbers, texts = range(each.number, each.number + len(each.texts)), each.texts
             if reading.rows is None or reading.is_joint:
@@ -552,11 +580,7 @@ def read_recording(
         elif last is None:
             last = 1
         else:
-            if each[0] > last + 1:
-                lost = each[0] - last - 1
-                reading.take_rows(wrong)
-                damaged(InputError(f"{path}:{each[0]}: {lost} lines are missing before it; use --salvage to go on"), lost)
-            last = each[0]
+            follow(each[0], each[0])
             one(*each)
     reading.take_rows(wrong)
     if reading.rows is None:

@@ -5,14 +5,18 @@ Needs the package mcap.
 
 import calendar
 import collections
-import io
+import functools
 import math
 import os
 import re
 import struct
 import types
+import zlib
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
 
 from .errors import InputError
 from .frames import Q10
@@ -20,13 +24,14 @@ from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS
 from .lines import LineFile, shortest
 from .messages import CONTACT_TYPE, DIAGNOSTICS_TYPE, FRAME_TOPICS, LINE_TYPE, TYPES, FrameMessages
 from .messages import diagnostics, health_status, name_in_ros, stamp
-from .recorded import LISTS
-from .ros_messages import decode, encode, schema_of
+from .recorded import LISTS, Array, Rows
+from .ros_messages import CDR_LITTLE_ENDIAN, PRIMITIVES, decode, encode, fields_of, schema_of
 
 LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can hold
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_ns = 1_000_000_000  # a chunk ends once it is that long, or has a megabyte
 CHUNK_MOST_bytes = 1 << 28  # of one that is read
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 3, 4, 5, 6, 15  # opcodes
 
 _COUNTS = ("sequence", "flags", "sensors_used", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us", "total_us")
 _CONTACT_NAMES = (*CONTACT_COLUMNS, *LATER_COLUMNS)
@@ -263,33 +268,54 @@ def contact_of(cells: list[str]) -> dict[str, Any]:
     return row
 
 
-def _cells_of(row: dict[str, Any], names: list[str]) -> str:
-    """The columns of these names, out of a fingertip_msgs/Contact."""
-    cells = {name: (shortest(row[name.lower()]) if name in _QUANTITIES else str(row[name.lower()])) for name in _CONTACT_NAMES}
-    cells |= {name: str(row[name.lower()]) for name in ("t_us", "frame", "device", *RAW_COLUMNS)}
-    cells |= {"temperature_degC": f"{row['temperature_degc']:.2f}", "time_us": f"{row['time_us']:.1f}"}
-    absent = [*(() if row["has_contact"] else _CONTACT_NAMES), *(() if row["has_raw"] else RAW_COLUMNS)]
-    cells |= dict.fromkeys(absent, "")
-    for kind, values in (("s", row["pressure_pa"]), ("tare", row["tare_pa"])):
-        cells |= {f"{kind}{k}_Pa": f"{value:.4f}" for k, value in enumerate(values)}
-    return ",".join(cells.get(name, "") for name in names)
-
-
 class Damaged(InputError):
     """A part of a file that cannot be read; reading goes on behind it."""
 
 
-class _Content(io.BytesIO):
-    """A record's, whose fields end within it."""
-
-    def read(self, length: int | None = -1, /) -> bytes:
-        data = super().read(length)
-        if length is not None and len(data) < length:
-            raise ValueError("it ends within a field")
-        return data
-
-
 Line = tuple[int, str, bool]  # number, text, whether it is torn
+
+
+class Contacts(NamedTuple):
+    """Messages of fingertip_msgs/Contact one after the other: the lines' numbers, their topics, their bytes."""
+
+    numbers: list[int]
+    topics: list[str]
+    data: list[bytes]
+
+
+@functools.cache
+def _contact_layout(frame_id: int, sensors: int) -> np.dtype[Any]:
+    """Of such a message behind its encapsulation, with a frame_id of this length and these sensors' pressures."""
+    fields: list[Any] = [("sec", "<u4"), ("nanosec", "<u4"), ("frame_id_bytes", "<u4"), ("frame_id", f"S{frame_id}")]
+    for name, kind, is_sequence in fields_of(CONTACT_TYPE)[1:]:
+        code = "<" + PRIMITIVES[kind].replace("?", "B")
+        fields += [(f"{name}_count", "<u4")] * is_sequence + [(name, code, (sensors,) if is_sequence else ())] * (
+            not is_sequence or sensors > 0
+        )
+    return np.dtype(fields, align=True)
+
+
+def _length_of(layout: np.dtype[Any]) -> int:
+    """Without what aligns its end."""
+    assert layout.fields
+    kind, at = layout.fields["tare_pa" if "tare_pa" in layout.fields else "tare_pa_count"][:2]
+    return int(at + kind.itemsize)
+
+
+def _shortest(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
+    """The number of the shortest text that reads back the same binary32."""
+    shape, values = values.shape, values.ravel()
+    exact = values.astype(np.float64)
+    size = np.abs(exact)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        scale = 10.0 ** np.clip(5 - np.floor(np.log10(size)), -30, 40)
+        found = np.rint(exact * scale) / scale
+        for more in (10.0, 100.0, 1000.0):
+            wrong = np.flatnonzero(found.astype(np.float32) != values)
+            if not len(wrong):
+                break
+            found[wrong] = np.rint(exact[wrong] * scale[wrong] * more) / (scale[wrong] * more)
+    return np.where((found.astype(np.float32) == values) & (size > 0), found, exact).reshape(shape)
 
 
 class McapLineReader:
@@ -307,127 +333,169 @@ class McapLineReader:
         self._channels: dict[int, tuple[str, str]] = {}  # topic, name of the schema
         self._is_joint: bool | None = None
         self._names: list[str] = []
+        self._is_torn = self._has_any = False
 
-    def __iter__(self) -> Iterator[Line]:
-        """Those that can be read."""
-        return (each for each in self.lines() if not isinstance(each, Damaged))
+    def _damaged(self, topic: str, error: ValueError) -> Damaged:
+        text = f"a damaged message on {topic} ({error}), or one of another version of the tool; use --salvage to skip it"
+        return Damaged(f"{self.path}: {text}")
 
-    def lines(self) -> Iterator[Line | Damaged]:
-        """What is damaged is among them, at its place."""
-        has_line = False
-        for each in self._messages():
-            if isinstance(each, Damaged):
-                yield each
-            elif each[1] in (LINE_TYPE, CONTACT_TYPE):
-                has_line = True
-                yield self._line(*each)
-        if not has_line:
+    def items(self) -> Iterator[Line | Contacts | Damaged]:
+        """The lines in the order in which they were written, rows many at a time; what is damaged is among them, at its place."""
+        for each in self._records():
+            yield each if isinstance(each, (Contacts, Damaged)) else self._of_line(each)
+        if not self._has_any:
             raise InputError(f"{self.path}: no recording of a fingertip; give one that fingertip has written")
         if self._is_torn:
             yield Damaged(f"{self.path}: the last chunk is torn; use --salvage to do without")
 
-    def _messages(self) -> Iterator[tuple[str, str, bytes] | Damaged]:
-        """(topic, name of the schema, data)"""
-        damage = (ValueError, MemoryError, struct.error, self._mcap.exceptions.McapError, self._mcap.stream_reader.zstandard.ZstdError)
-        self._is_torn = False
+    def _records(self) -> Iterator[Line | Contacts | Damaged]:
+        """What is in the file, in its order."""
+        struct_error, damage = struct.error, (ValueError, MemoryError, struct.error, self._mcap.stream_reader.zstandard.ZstdError)
         try:
             with open(self.path, "rb") as file:
                 size = os.fstat(file.fileno()).st_size
-                stream = self._mcap.data_stream.ReadDataStream(file)
-                if size < len(MAGIC) or stream.read(len(MAGIC)) != MAGIC:
+                if file.read(len(MAGIC)) != MAGIC:
                     raise InputError(f"{self.path}: no MCAP file; give one that fingertip has written")
-                for at, opcode, content in self._records(stream, size):
+                at = len(MAGIC)
+                while at < size:  # a killed writer leaves whole chunks
+                    head = file.read(9)
+                    length = int.from_bytes(head[1:], "little")
+                    if len(head) < 9 or length > size - at - 9:
+                        self._is_torn = True
+                        return
+                    if head[0] == _DATA_END:
+                        return
                     if self._progress:
                         self._progress(at / size)
                     try:
-                        yield from self._judge(opcode, content)
+                        if head[0] == _CHUNK and length <= CHUNK_MOST_bytes:
+                            yield from self._messages(self._chunk(file.read(length)))
+                        elif head[0] in (_SCHEMA, _CHANNEL, _MESSAGE):
+                            yield from self._messages(head + file.read(length))
                     except damage as error:
-                        yield Damaged(f"{self.path}: damaged at byte {at} ({error}); use --salvage to skip the chunk")
-        except EOFError:
-            self._is_torn = True
+                        what = "it ends within a field" if isinstance(error, struct_error) else error
+                        yield Damaged(f"{self.path}: damaged at byte {at} ({what}); use --salvage to skip the chunk")
+                    at = file.seek(at + 9 + length)
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
 
-    def _records(self, stream: Any, size: int) -> Iterator[tuple[int, int, bytes]]:
-        """(place, opcode, content). Each ends by its length, whatever is in it. Raises EOFError where the last one is torn."""
-        while stream.count < size:  # a killed writer leaves whole chunks
-            at = stream.count
-            if size - at < 9:
-                raise EOFError
-            opcode, length = stream.read1(), stream.read8()
-            if length > size - stream.count:
-                raise EOFError
-            if opcode == self._mcap.opcode.Opcode.DATA_END:
-                return
-            yield at, opcode, stream.read(length)
-
-    def _judge(self, opcode: int, content: bytes) -> list[tuple[str, str, bytes]]:
-        """The messages in a record. Of schemas and channels only what they need is read: damage elsewhere costs none. Raises what mcap raises,
-        or ValueError."""
-        known, records = self._mcap.opcode.Opcode, self._mcap.records
-        stream = self._mcap.data_stream.ReadDataStream(_Content(content))
-        if opcode == known.SCHEMA:
-            number, name = stream.read2(), stream.read(stream.read4())
-            self._schemas[number] = name.decode("utf-8", "replace").replace("/msg/", "/")
-        elif opcode == known.CHANNEL:
-            number, schema, topic = stream.read2(), stream.read2(), stream.read(stream.read4())
-            stream.read(stream.read4())  # the encoding
-            self._channels[number] = topic.decode("utf-8", "replace"), self._schemas.get(schema, "")
-        elif opcode == known.MESSAGE:
-            message = records.Message.read(stream, len(content))
-            if message.channel_id not in self._channels:
-                raise ValueError(f"channel {message.channel_id} is unknown")
-            return [(*self._channels[message.channel_id], message.data)]
-        elif opcode == known.CHUNK:
-            return self._chunk(records.Chunk.read(stream))
-        return []
-
-    def _chunk(self, chunk: Any) -> list[tuple[str, str, bytes]]:
-        size = chunk.uncompressed_size
-        if chunk.compression == "lz4":
+    def _chunk(self, content: bytes) -> bytes:
+        """The records in it. Raises ValueError."""
+        size, crc, name = struct.unpack_from("<QII", content, 16)
+        compression = content[32 : 32 + name]
+        (length,) = struct.unpack_from("<Q", content, 32 + name)
+        data = content[40 + name : 40 + name + length]
+        if compression == b"lz4":
             raise InputError(f"{self.path}: chunks packed by lz4 are not read; pack them by zstd: mcap compress FILE -o OUT")
-        if chunk.compression not in ("", "zstd"):
-            raise ValueError(f'compression "{chunk.compression}" is unknown')
-        if size > CHUNK_MOST_bytes:
-            raise ValueError(f"a chunk of {size} bytes")
-        if chunk.compression and self._mcap.stream_reader.zstandard.frame_content_size(chunk.data) not in (-1, size):
-            raise ValueError("its length is wrong")
-        stream, length = self._mcap.stream_reader.get_chunk_data_stream(chunk, validate_crc=True)
-        if length != size:
-            raise ValueError("its length is wrong")
-        try:
-            return [
-                message
-                for _, opcode, content in self._records(stream, size)
-                if opcode != self._mcap.opcode.Opcode.CHUNK
-                for message in self._judge(opcode, content)
-            ]
-        except EOFError:
-            raise ValueError("a record in it is torn") from None
+        if len(data) < length or compression not in (b"", b"zstd") or size > CHUNK_MOST_bytes:
+            raise ValueError(f'a chunk of {size} bytes, compression "{compression.decode("utf-8", "replace")[:20]}"')
+        if compression:
+            zstandard = self._mcap.stream_reader.zstandard
+            if zstandard.frame_content_size(data) not in (-1, size):
+                raise ValueError("its length is wrong")
+            data = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+        if len(data) != size or (crc and zlib.crc32(data) != crc):
+            raise ValueError("its length or CRC is wrong")
+        return data
 
-    def _line(self, topic: str, name: str, data: bytes) -> Line | Damaged:
-        try:
-            row = decode(name, data)
-            return self._of_row(row) if name == CONTACT_TYPE else self._of_line(row)
-        except ValueError as error:
-            return Damaged(
-                f"{self.path}: a damaged message on {topic} ({error}), or one of another version of the tool; use --salvage to skip it"
-            )
+    def _messages(self, data: bytes) -> list[Line | Contacts | Damaged]:
+        """Those that are wanted in a row of records. Raises ValueError, or what struct raises, where one of them is damaged."""
+        found: list[Line | Contacts | Damaged] = []
+        numbers: list[int] = []
+        topics: list[str] = []
+        rows: list[bytes] = []
+        at, size, channels, unpack = 0, len(data), self._channels, struct.unpack_from
+        while at < size:
+            length = unpack("<Q", data, at + 1)[0]
+            begin, end = at + 9, at + 9 + length
+            if end > size:
+                raise ValueError("a record in it is torn")
+            kind = data[at]
+            at = end
+            if kind == _MESSAGE:
+                if length < 22:
+                    raise ValueError("it ends within a field")
+                channel = channels.get(unpack("<H", data, begin)[0])
+                if channel is None:
+                    raise ValueError("its channel is unknown")
+                topic, name = channel
+                begin += 22
+                if name == CONTACT_TYPE:
+                    frame_id = unpack("<I", data, begin + 12)[0] if end - begin > 16 else 0
+                    number_at = begin + 16 + frame_id + -(12 + frame_id) % 8
+                    if data[begin : begin + 4] == CDR_LITTLE_ENDIAN and frame_id and number_at + 8 <= end:
+                        numbers.append(unpack("<Q", data, number_at)[0])
+                        topics.append(topic)
+                        rows.append(data[begin:end])
+                        continue
+                if name in (CONTACT_TYPE, LINE_TYPE):
+                    if numbers:
+                        found.append(Contacts(numbers, topics, rows))
+                        numbers, topics, rows = [], [], []
+                    try:
+                        row = decode(name, data[begin:end])
+                        if "\n" in row.get("text", "\n"):
+                            raise ValueError("it ends within")
+                        found.append((row["line"], row["text"], row["torn"]))
+                    except ValueError as error:
+                        found.append(self._damaged(topic, error))
+            elif kind in (_SCHEMA, _CHANNEL):
+                self._declare(kind, data[begin:end])
+        self._has_any = self._has_any or bool(found) or bool(numbers)
+        return [*found, Contacts(numbers, topics, rows)] if numbers else found
 
-    def _of_line(self, row: dict[str, Any]) -> Line:
-        text: str = row["text"]
-        if "\n" in text:
-            raise ValueError("a line that ends within")
+    def _declare(self, kind: int, content: bytes) -> None:
+        """Of schemas and channels only what they need is read: damage elsewhere costs none."""
+
+        def text(at: int) -> tuple[str, int]:
+            end = at + 4 + int(struct.unpack_from("<I", content, at)[0])
+            if end > len(content):
+                raise ValueError("it ends within a field")
+            return content[at + 4 : end].decode("utf-8", "replace"), end
+
+        (number,) = struct.unpack_from("<H", content)
+        if kind == _SCHEMA:
+            self._schemas[number] = text(2)[0].replace("/msg/", "/")
+        else:
+            (schema,) = struct.unpack_from("<H", content, 2)
+            topic, end = text(4)
+            text(end)  # the encoding
+            self._channels[number] = topic, self._schemas.get(schema, "")
+
+    def _of_line(self, line: Line) -> Line:
+        """Notes what it says of the rows."""
+        text = line[1].rstrip("\r")
         if self._is_joint is None:
             self._is_joint = text == "# fingertip-recording 2"
         if not self._names and text and not text.startswith("#"):
             self._names = text.split(",")
-        return row["line"], text, row["torn"]
+        return line
 
-    def _of_row(self, row: dict[str, Any]) -> Line:
-        if not row["has_raw"]:
-            row["pressure_pa"] = row["tare_pa"] = ()
-        sensors = sum(name.startswith("tare") for name in self._names) if row["has_raw"] else 0
-        if math.isnan(row["time_us"]) == bool(self._is_joint) or {len(row["pressure_pa"]), len(row["tare_pa"])} != {sensors}:
-            raise ValueError("a row of another recording")
-        return row["line"], _cells_of(row, self._names), False
+    def tables(self, contacts: Contacts, rows: Rows) -> "Iterator[tuple[list[int], Array, Array, Array] | Damaged]":
+        """Numbers, devices, times and columns, and what is damaged among them."""
+        lengths = np.array(list(map(len, contacts.data)))
+        fine = np.zeros(len(lengths), bool)
+        table, devices, times_us = np.empty((len(lengths), len(rows.names))), np.empty(len(lengths)), np.empty(len(lengths))
+        for length in set(lengths.tolist()):
+            at = np.flatnonzero(lengths == length)
+            data = b"".join(contacts.data) if len(at) == len(lengths) else b"".join([contacts.data[k] for k in at])
+            messages = np.frombuffer(data, np.uint8).reshape(-1, length)[:, 4:]
+            frame_ids = messages[:, 8:12].copy().view("<u4").ravel()
+            layout = _contact_layout(int(frame_ids[0]), rows.sensors)
+            sensors = rows.sensors if _length_of(layout) <= length - 4 else 0
+            layout = layout if sensors else _contact_layout(int(frame_ids[0]), 0)
+            if _length_of(layout) > length - 4:
+                continue  # torn
+            padded = np.zeros((len(at), layout.itemsize), np.uint8)
+            padded[:, : length - 4] = messages[:, : layout.itemsize]
+            found = padded.view(layout).ravel()
+            table[at], fine[at] = rows.of_contacts(found, sensors, _shortest)
+            devices[at], times_us[at] = found["device"], np.round(found["time_us"], 1)
+            fine[at] &= (frame_ids == frame_ids[0]) & (np.isnan(found["time_us"]) != bool(self._is_joint)) & ~np.isinf(found["time_us"])
+        numbers = np.array(contacts.numbers, "Q")
+        starts = np.flatnonzero(~fine | np.concatenate(([True], ~fine[:-1] | (numbers[1:] - numbers[:-1] != 1))))
+        for begin, end in zip(starts.tolist(), [*starts[1:].tolist(), len(fine)]):
+            if fine[begin]:
+                yield contacts.numbers[begin:end], devices[begin:end], times_us[begin:end], table[begin:end]
+            else:
+                yield self._damaged(contacts.topics[begin], ValueError("no row of this recording"))

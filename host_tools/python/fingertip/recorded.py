@@ -4,7 +4,8 @@ import io
 import math
 import operator
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, SEN
 from .line import Acknowledgement, Calibration, Contact, Health, Info, PadProfile, SyncEdge, Wire
 from .wire import layout_of
 
+Array = npt.NDArray[np.float64]
 _LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "h": 2**15 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
 _LEAST = {"h": -(2**15)}  # of the others 0
 _WHOLE = re.compile("-?[0-9]+")
@@ -184,6 +186,34 @@ class Rows:
             if (empty[:, at] & (flags & bit != 0)).any():
                 return None
         return None if (flags & self._untold).any() or empty[has_raw, first_raw:].any() else table
+
+    def of_contacts(
+        self, found: npt.NDArray[Any], sensors: int, shortest: Callable[[npt.NDArray[np.float32]], Array]
+    ) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """As table, of messages fingertip_msgs/Contact with this number of pressures, by the names of their fields; and whether each is a row of
+        this recording. shortest: of binary32."""
+        has_contact, has_raw = found["has_contact"] != 0, found["has_raw"] != 0
+        first_raw, last = self._first_raw, self._first_raw + len(RAW_COLUMNS)
+        table = np.full((len(found), len(self.names)), math.nan)
+        floats = [at for at in range(2, first_raw) if self._codes[at] == "f"]
+        values = np.stack([found[self.names[at].lower()] for at in floats], axis=1)
+        bits = np.array([self._flags[at] for at in floats], np.uint32)
+        wrong = np.isinf(values) | (np.isnan(values) & ((found["flags"][:, None] & bits) != 0))
+        fine = (has_contact | has_raw) & ~(has_contact & (wrong.any(axis=1) | ((found["flags"] & self._untold) != 0)))
+        table[:, floats] = shortest(values)
+        for at in (at for at in range(last - 1) if self._codes[at] != "f"):
+            table[:, at] = found[self.names[at].lower()]
+        table[~has_contact, 2:first_raw] = math.nan
+        fine &= ~has_raw | ((found["pressure_pa_count"] == self.sensors) & (found["tare_pa_count"] == self.sensors) & (sensors > 0))
+        if sensors:
+            table[:, last - 1] = np.round(found["temperature_degc"], 2)
+            pressures = [found[name].reshape(len(found), sensors) for name in ("pressure_pa", "tare_pa")]
+            table[:, last:] = np.round(np.concatenate(pressures, axis=1), 4)
+            scaled = np.rint(table[:, last - 1 :] * np.where(np.arange(1 + 2 * sensors) == 0, 100, Q10))
+            most = np.where(np.arange(1 + 2 * sensors) == 0, 2.0**15, 2.0**31)
+            fine &= ~has_raw | ((scaled >= -most) & (scaled < most)).all(axis=1)
+        table[~has_raw, first_raw:] = math.nan
+        return table, fine
 
     def tables(self, texts: Sequence[str]) -> Iterator[npt.NDArray[np.float64] | ValueError]:
         """All of them in their order: a count of rows, or what is wrong with one."""
