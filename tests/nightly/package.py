@@ -6,10 +6,10 @@ import subprocess
 import sys
 import time
 
-from nightly import PATIENCE_s, Programs, job
+from nightly import PATIENCE_s, Programs, job, run
 
 from fingertip import Fingertip
-from fingertip.files import InputError
+from fingertip.files import InputError, read_recording
 
 RATE_Hz, SECONDS = 1310, 60
 
@@ -52,6 +52,24 @@ def python(build):
     with Programs(build) as programs:
         found = read(programs.fake_device("AAAA", f"rate={RATE_Hz}"), SECONDS)
     return {"python_seconds": SECONDS} | {f"python_{name}": round(value, 2) for name, value in found.items()}
+
+
+@job("tools", ("python_mcap_over_csv", "<=", 1.5))
+def recordings(build):
+    """Processor time of read_recording for a row of a minute at the highest rate, the better of three readings of each kind."""
+    with Programs(build) as programs:
+        files, found = [programs.folder / f"minute.{end}" for end in ("csv", "mcap")], {}
+        port = programs.fake_device("AAAA", f"rate={RATE_Hz}")
+        run(build / "host_tools/tool/cli/fingertip", "record", files[0], "--port", port, "--seconds", SECONDS)
+        run(build / "host_tools/tool/cli/fingertip", "convert", *files)
+        for file in files:
+            times_s = []
+            for _ in range(3):
+                begun_s = time.process_time()
+                rows = len(read_recording(file)["t_us"])
+                times_s.append(time.process_time() - begun_s)
+            found[f"python_{file.suffix[1:]}_us_per_row"] = round(min(times_s) / rows * 1e6, 2)
+    return found | {"python_mcap_over_csv": round(found["python_mcap_us_per_row"] / found["python_csv_us_per_row"], 2)}
 
 
 if __name__ == "__main__":

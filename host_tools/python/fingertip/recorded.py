@@ -19,6 +19,7 @@ Array = npt.NDArray[np.float64]
 _LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "h": 2**15 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
 _LEAST = {"h": -(2**15)}  # of the others 0
 _WHOLE = re.compile("-?[0-9]+")
+_EXPONENT = re.compile(rb"(?<=[,-])[1-9](?:\.[0-9]+)?e[-+][0-3][0-9](?=[,\n])")  # within binary32
 _NUMBER = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _BINARY32 = 2.0**-150, 2.0**128 - 2.0**103  # not above the first it becomes 0, from the second on infinite
 _BINARY64 = 0.0, math.inf
@@ -151,8 +152,11 @@ class Rows:
     def table(self, texts: Sequence[str]) -> npt.NDArray[np.float64] | None:
         """As values of each row, many times as fast; None where one of them is not written as writers write most: values judges it then."""
         joined = ("\n".join(texts) + "\n").encode("ascii", "replace")
-        # What has no exponent and no such run of zeros is 0 only where it is written so.
-        if joined.translate(None, b"0123456789.,-\n") or b"0" * 40 in joined or not self.sensors:
+        # What has no such run of zeros, and an exponent of its own digits alone, is 0 only where it is written so.
+        others = joined.translate(None, b"0123456789.,-\n")
+        if others.strip(b"e+") or b"0" * 40 in joined or not self.sensors:
+            return None
+        if others and (len(_EXPONENT.findall(joined)) != others.count(b"e") or others.count(b"+") != joined.count(b"e+")):
             return None
         first_raw, last = self._first_raw, self._first_raw + len(RAW_COLUMNS)
         has_raw = np.empty(len(texts), bool)
