@@ -57,7 +57,7 @@ constexpr double MORE_LOAD = 1.1, MORE_LOAD_N = 0.1;
 
 struct Options {
   std::string cache;
-  double slice_us = 500.0, friction_falls = 0.67;
+  double slice_us = 500.0, friction_falls = 0.5;
 };
 
 // A fingertip that is an emulated board, from the host's end of its USB line: it gets its pad's
