@@ -3,6 +3,9 @@
 #include "common/apart.h"
 
 #define INTERVAL_us 2000000u /* between two comparisons */
+/* Of any air in which a hand works: sea level in a storm is 108 kPa, 9 km up 30 kPa. */
+#define AIR_LEAST_Pa 30000
+#define AIR_MOST_Pa 120000
 
 bool plausibility_compare(struct plausibility *plausibility, const struct frame *frame,
                           const struct conditioned *conditioned) {
@@ -11,10 +14,12 @@ bool plausibility_compare(struct plausibility *plausibility, const struct frame 
     return false;
   }
   int32_t pressure_Pa[FT_MAX_SENSORS];
+  uint32_t no_air = 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     pressure_Pa[k] = frame->pressure_Pa_q10[k] / 1024;
+    no_air |= pressure_Pa[k] < AIR_LEAST_Pa || pressure_Pa[k] > AIR_MOST_Pa ? usable & (UINT32_C(1) << k) : 0;
   }
-  plausibility->apart = apart_find(pressure_Pa, usable, frame->sensor_count, plausibility->apart_Pa);
+  plausibility->apart = no_air | apart_find(pressure_Pa, usable, frame->sensor_count, plausibility->apart_Pa);
   plausibility->compared = usable;
   plausibility->next_us = frame->t_us + INTERVAL_us;
   return true;

@@ -2,8 +2,8 @@
  *
  * A PROM whose CRC-4 is right by chance makes pressures that are wrong by up to 65 kPa, always by the same. A tare
  * hides that, but not the wrong sensitivity behind it. At rest all sensors of a pad measure the same air: one that
- * reads apart from the others (common/apart.h) is doubtful, from the first frame after a tare on and for as long as it
- * does so. So is one that was tared under a press. */
+ * reads apart from the others (common/apart.h), or what no air has, is doubtful, from the first frame after a tare on
+ * and for as long as it does so. So is one that was tared under a press, and an array of parts of another range. */
 #pragma once
 
 #include "condition/condition.h"

@@ -39,6 +39,14 @@ TEST(test_one_apart_is_known_from_the_first_frame_on) {
   TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
 }
 
+TEST(test_what_all_read_is_no_air) {
+  for (int kPa = 5; kPa <= 125; kPa += 10) {
+    read_all(1000 * kPa);
+    next_frame(2000000);
+    TEST_ASSERT_EQUAL_HEX32(kPa > 30 && kPa < 120 ? 0 : ALL, plausibility.apart);
+  }
+}
+
 TEST(test_moulded_sensors_that_differ_by_kilopascals_are_not_apart) {
   for (int k = 0; k < SENSORS; k++) {
     frame.pressure_Pa_q10[k] += 1500 * (k % 4) * 1024;
