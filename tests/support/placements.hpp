@@ -17,7 +17,7 @@ struct KnownPad {
   fingertip::calibrating::Array array;
   std::vector<double> gain; /* mean 1 */
   std::vector<double> x_mm, y_mm;
-  std::vector<double> own_width; /* log: what each sensor feels a contact wider */
+  std::vector<double> own_width; /* log: of a contact at each sensor, over the usual */
 
   double dip = 0.0, dip_mm = 20.0; /* of cast rubber: share of the peak, and how wide */
 
@@ -44,6 +44,7 @@ struct KnownPad {
     double force = 1.0;             /* times the usual */
     double axes = 1.0, slant = 0.0; /* ratio of the axes, and the direction of the long one */
     double width_mm = 5.5;
+    double slope = 0.0; /* tangential force along x over the normal one, as PULL has it */
   };
   static constexpr double PEAK_Pa = 14000.0;
 
@@ -55,8 +56,12 @@ struct KnownPad {
     const double c = std::cos(press.slant), s = std::sin(press.slant), root = std::sqrt(press.axes);
     const double a = (c * u + s * v) / root, b = (c * v - s * u) * root;
     const double square = a * a + b * b;
+    double pulled = 0.0;
+    for (const auto &[strength, ratio] : fingertip::calibrating::PULL) {
+      pulled += press.slope * strength * u / width_mm * std::exp(-square / (2.0 * ratio * ratio * width_mm * width_mm));
+    }
     return PEAK_Pa * press.force *
-           (std::pow(1.0 + square / (2.0 * n * width_mm * width_mm), -n) -
+           (std::pow(1.0 + square / (2.0 * n * width_mm * width_mm), -n) + pulled -
             dip * std::exp(-square / (2.0 * dip_mm * dip_mm)));
   }
 
@@ -75,13 +80,15 @@ struct KnownPad {
 
 /* Anywhere on the array, one weight, one every four seconds. */
 inline std::vector<fingertip::calibrating::Placement> good_session(const KnownPad &pad, std::size_t count,
-                                                                   std::uint64_t seed) {
+                                                                   std::uint64_t seed, double slope = 0.0) {
   fingertip::Random random(seed, 2, 0);
   std::vector<fingertip::calibrating::Placement> placements;
   for (std::size_t i = 0; i < count; i++) {
     const double x = random.uniform(pad.array.x_mm.front(), pad.array.x_mm.back());
     const double y = random.uniform(pad.array.y_mm.front(), pad.array.y_mm.back());
-    placements.push_back(pad.place({x, y}, 4.0 * static_cast<double>(i), random));
+    KnownPad::Press press{x, y};
+    press.slope = slope;
+    placements.push_back(pad.place(press, 4.0 * static_cast<double>(i), random));
   }
   return placements;
 }

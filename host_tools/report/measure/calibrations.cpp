@@ -19,7 +19,7 @@ MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(solved), FIELD(he
                FIELD(halves_shape), FIELD(halves_gauge), FIELD(force_scale), FIELD(force_scale_sd),
                FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(dip_share), FIELD(dip_sd_mm), FIELD(worst_shape_sd),
                FIELD(gauge_sd), FIELD(force_share), FIELD(ellipse), FIELD(offset_share), FIELD(drift_share),
-               FIELD(kept_share))
+               FIELD(slope), FIELD(kept_share), FIELD(wanted_x_mm), FIELD(wanted_y_mm))
 
 MEASURE_RECORD(calibrated_sensor, FIELD(gain), FIELD(gain_sd), FIELD(reading_sd), FIELD(off_x_mm), FIELD(off_y_mm),
                FIELD(wider))
@@ -30,7 +30,7 @@ static calibration found_by(const Judgement &judgement, const Shape &shape) {
   found.state = static_cast<std::int32_t>(judgement.state);
   std::strncpy(found.reason, name_of(judgement.reason), sizeof found.reason - 1);
   found.solved = solution.solved;
-  found.helps = judgement.helps;
+  found.helps = judgement.helps && judgement.gains_help;
   found.width_mm = solution.sigma_mm;
   found.residual_share = solution.residual_share;
   found.prior_sigma_mm = shape.sigma_mm;
@@ -43,6 +43,7 @@ static calibration found_by(const Judgement &judgement, const Shape &shape) {
   found.ellipse = judgement.ellipse;
   found.offset_share = judgement.offset_share;
   found.drift_share = judgement.drift_share;
+  found.slope = judgement.slope;
   found.kept_share = judgement.kept_share;
   found.sigma_sd_mm = solution.sigma_sd_mm;
   found.dip = solution.dip;
@@ -75,11 +76,11 @@ void fingertip::measure::describe(const Array &layout, const std::vector<Placeme
   }
 }
 
-// Sessions [session][placement][sensor]; a sensor whose reading is not a number has none. No placement follows.
+// Sessions [session][placement][sensor]; a sensor whose reading is not a number has none. last: no placement follows.
 // force_N: of each placement. fading: share of the readings that each loses in half a second, or none. own
 // [session][sensor]: zeros unless the session found it.
 static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm, double noise_Pa,
-                      double force_N, Batch<const double, 2> t_s, Batch<const double, 3> reading_Pa,
+                      double force_N, std::int64_t last, Batch<const double, 2> t_s, Batch<const double, 3> reading_Pa,
                       Batch<const double, 2> fading, Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors,
                       Batch<fit_own, 2> own) {
   same_length(x_mm, y_mm);
@@ -107,8 +108,11 @@ static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, 
         placement.reading_Pa.push_back(there ? readings[k] : 0.0);
       }
     }
-    describe(layout, placements, judge(layout, placements, true), force_N, found[session], sensors.row(session),
-             own.row(session));
+    const Judgement judgement = judge(layout, placements, last != 0);
+    describe(layout, placements, judgement, force_N, found[session], sensors.row(session), own.row(session));
+    const Wanted wanted = next_place(layout, placements, judgement.solution);
+    found[session].wanted_x_mm = wanted.x_mm;
+    found[session].wanted_y_mm = wanted.y_mm;
   });
 }
 MEASURE_ENTRY(calibrate)

@@ -20,7 +20,8 @@ struct calibration {
   double prior_sigma_mm, prior_width_mm, dip_share, dip_sd_mm; // as fit_settings has them
   double sigma_sd_mm, dip, dip_sd, position_mm, halves_shape, halves_gauge;
   double force_scale, force_scale_sd; // 0: there is none
-  double worst_shape_sd, gauge_sd, force_share, ellipse, offset_share, drift_share, kept_share;
+  double worst_shape_sd, gauge_sd, force_share, ellipse, offset_share, drift_share, slope, kept_share;
+  double wanted_x_mm, wanted_y_mm; // where a placement more would help most
 };
 // What it found of one sensor.
 struct calibrated_sensor {

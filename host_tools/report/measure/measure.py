@@ -230,10 +230,10 @@ class Measure(Library):
         self.call("sensor_osr", osr, *found)
         return tuple(int(one[0]) for one in found)
 
-    def calibrate(self, x_mm, y_mm, pitch_mm, t_s, reading_Pa, noise_Pa, *, force_N=1.0, fading=None):
+    def calibrate(self, x_mm, y_mm, pitch_mm, t_s, reading_Pa, noise_Pa, *, force_N=1.0, fading=None, last=True):
         """(calibration [session], calibrated_sensor [session, sensor], fit_own [session, sensor]) of sessions of placements: t_s [session, placement],
         reading_Pa [session, placement, sensor], NaN where a sensor has none. force_N: of each; fading: share of the readings
-        that each loses in half a second."""
+        that each loses in half a second; last: no placement follows."""
         sessions, _, sensors = reading_Pa.shape
         found = (
             self.made("calibration", sessions),
@@ -246,6 +246,7 @@ class Measure(Library):
             float(pitch_mm),
             float(noise_Pa),
             float(force_N),
+            int(last),
             t_s,
             reading_Pa,
             np.zeros((0, 0)) if fading is None else fading,

@@ -18,7 +18,6 @@ constexpr double DOWN_s = 0.3, TAP_DOWN_s = 0.1; // from first touch to the full
 constexpr double SETTLED_BEGIN_s = 0.5, SETTLED_END_s = 1.0, WEIGHT_DOWN_s = 2.0, PAUSE_s = 1.5;
 constexpr int SETTLED_STEPS = 5;
 constexpr double TAP_READ_s = 0.15;
-constexpr double RESTED_BEFORE_s = 1.3; // the readings after the rest
 
 constexpr double OFFSET_Pa = 500.0, DRIFT_Pa_s = 100.0;
 constexpr double CLUSTER_RADIUS_mm = 7.0;
@@ -208,7 +207,7 @@ std::optional<calibrating::Placement> Session::next(SessionPad &pad, std::option
   calibrating::Placement placement =
       pad.place(lying ? feet_.lying : feet_.round, force_N, x_mm, y_mm, lying ? angle : 0.0);
   for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
-    placement.reading_Pa[k] += zero_Pa_[k] + drift_Pa_s_[k] * RESTED_BEFORE_s;
+    placement.reading_Pa[k] += zero_Pa_[k] + drift_Pa_s_[k] * calibrating::RESTED_BEFORE_s;
     placement.rest_Pa.push_back(drift_Pa_s_[k] * placement.t_s);
   }
   made_++;

@@ -20,6 +20,7 @@ PRIOR_WIDTH_MM = 0.5  # of the prior on sigma that a user sets: PRIOR_WIDTH in l
 DIP_WIDTHS = 5.0  # standard deviation of the dip, over that of the response: as a calibration expects it
 DIP_FROM_WIDTHS = 3.0
 PLACEMENTS, SESSIONS, EVERY_S = 20, 30, 8.0
+GUIDED, HAND_OFF_mm = 8, 1.0  # sessions
 PASSES = 31
 PLACEMENT_PEAK_PA = 1500.0  # a calibration refuses lighter ones
 
@@ -70,8 +71,11 @@ class Grid:
     def sessions(self, seed):
         """Lists of presses, as a person would set a weight down: inside the array, apart from each other, none of them judged."""
         random = np.random.default_rng(seed)
-        free = np.flatnonzero(~self.judged & self.inside & (self.reading_Pa.max(axis=1) >= PLACEMENT_PEAK_PA))
-        return [random.permutation(free)[:PLACEMENTS] for _ in range(SESSIONS)]
+        return [random.permutation(self.placements())[:PLACEMENTS] for _ in range(SESSIONS)]
+
+    def placements(self):
+        """The presses of which sessions are made."""
+        return np.flatnonzero(~self.judged & self.inside & (self.reading_Pa.max(axis=1) >= PLACEMENT_PEAK_PA))
 
 
 def fit_gaussian(xy, reading_Pa, start, width_mm):
@@ -102,11 +106,24 @@ class Fingertip:
         self.measure, self.layout_mm, self.pitch_mm = measure, tuple(np.ascontiguousarray(layout.T)), pitch_mm
         self.array = measure.array(*self.layout_mm, pitch_mm)
 
-    def calibrate(self, reading_Pa, every_s=EVERY_S):
-        """A Calibration for each session of placements [session, placement, sensor]."""
+    def calibrate(self, reading_Pa, every_s=EVERY_S, last=True):
+        """A Calibration for each session of placements [session, placement, sensor]. last: no placement follows."""
         t_s = np.tile(every_s * np.arange(reading_Pa.shape[1]), (len(reading_Pa), 1))
-        found = self.measure.calibrate(*self.layout_mm, self.pitch_mm, t_s, np.ascontiguousarray(reading_Pa), NOISE_PA)
+        found = self.measure.calibrate(*self.layout_mm, self.pitch_mm, t_s, np.ascontiguousarray(reading_Pa), NOISE_PA, last=last)
         return [Calibration(*one) for one in zip(*found)]
+
+    def guided(self, grid, seed):
+        """A Calibration for each session that the tool leads, by a hand that is HAND_OFF_mm (sd) off."""
+        random, free = np.random.default_rng(seed), grid.placements()
+        made, found, wanted_mm = [[] for _ in range(GUIDED)], [None] * GUIDED, np.zeros((GUIDED, 2))
+        while open_ := [i for i in range(GUIDED) if found[i] is None]:
+            for i in open_:
+                far = np.hypot(*(grid.xy[free] - wanted_mm[i] - HAND_OFF_mm * random.normal(size=2)).T)
+                made[i].append(free[np.where(np.isin(free, made[i]), np.inf, far).argmin()])
+            for i, one in zip(open_, self.calibrate(grid.reading_Pa[np.array([made[i] for i in open_])], last=False)):
+                wanted_mm[i] = one.found["wanted_x_mm"], one.found["wanted_y_mm"]
+                found[i] = one if one.found["state"] else None
+        return found
 
     def inputs(self, reading_Pa, calibration=None, prior=(0.0, 0.0), **fields):
         """What the fit gets of readings [press, sensor], NaN where a sensor is missing: settings, readings in 1/1024 Pa, bitmap of usable sensors, own."""
@@ -140,12 +157,6 @@ class Calibration:
     @property
     def good(self):
         return bool(self.found["state"] == 1)
-
-    def by_gains(self):
-        """Without the sensors' own locations and widths."""
-        found = self.found.copy()
-        found["has_own"] = False
-        return Calibration(found, self.sensors, self.own)
 
 
 def dip_share(grid):

@@ -29,6 +29,7 @@ EVIDENCE = {
     "residual": "residual_share",
     "sigma_mm": "width_mm",
     "sigma_sd_mm": "sigma_sd_mm",
+    "slope": "slope",
 }
 
 

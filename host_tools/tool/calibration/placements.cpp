@@ -238,13 +238,6 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
     }
     return std::nullopt;
   }
-  past_Pa_.resize(sensors_, 0.0);
-  placement.earlier_Pa.resize(sensors_, 0.0);
-  for (std::size_t k = 0; k < sensors_; k++) {
-    placement.earlier_Pa[k] = past_Pa_[k] * std::exp((past_s_ - placement.t_s) / PAST_s);
-    past_Pa_[k] = placement.earlier_Pa[k] + placement.reading_Pa[k];
-  }
-  past_s_ = placement.t_s;
   state_ = State::taken;
   return placement;
 }

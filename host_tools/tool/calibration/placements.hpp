@@ -1,8 +1,9 @@
 /* Finds placements in a stream of frames: a weight was set down, rested, and was lifted again.
  *
  * Frames of any rate from 12 a second and any oversampling; all times are the frames' own. What
- * touches the pad is decided against the readings just before, so the firmware's gate does not matter. Of
- * its zero only what it moves by in a contact does: what stood off before goes on to fade there.
+ * touches the pad is decided against the readings just before, so neither the firmware's gate nor the level of its
+ * zero matters. While a contact lasts its zero goes on to fade with what the rubber kept of presses before: that is
+ * taken off the readings.
  *
  * A contact begins where a reading rises by TOUCH_Pa within a second. It is a placement once it
  * has rested for a second: then the mean of the readings from 0.5 to 1 s is taken, above the mean
@@ -81,8 +82,7 @@ private:
   double last_s_ = 0.0, ahead_s_ = 0.0; /* ahead_s_: of the frames' own time, since a restart */
   Slot open_;
   std::deque<Slot> slots_; /* of the last seconds, oldest first */
-  std::vector<double> rest_Pa_, zero_Pa_, above_Pa_, past_Pa_;
-  double past_s_ = 0.0;
+  std::vector<double> rest_Pa_, zero_Pa_, above_Pa_;
   double touch_s_ = 0.0, moved_s_ = 0.0, rest_from_s_ = 0.0, peak_Pa_ = 0.0;
 };
 

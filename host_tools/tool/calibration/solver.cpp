@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
@@ -165,6 +166,21 @@ double Solution::worst_shape_sd() const {
                           : *std::max_element(shape_sd.begin(), shape_sd.end());
 }
 
+void set_earlier(std::vector<Placement> &placements) {
+  std::vector<double> left_Pa;
+  double at_s = 0.0;
+  for (Placement &placement : placements) {
+    left_Pa.resize(placement.reading_Pa.size(), 0.0);
+    const double fading = std::exp((at_s - placement.t_s) / PAST_s);
+    for (double &each : left_Pa) {
+      each *= fading;
+    }
+    placement.earlier_Pa = left_Pa;
+    std::transform(left_Pa.begin(), left_Pa.end(), placement.reading_Pa.begin(), left_Pa.begin(), std::plus<>());
+    at_s = placement.t_s;
+  }
+}
+
 double median(std::vector<double> values) {
   const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -192,11 +208,13 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
   const Layout &layout = model.layout;
   const auto n = static_cast<Eigen::Index>(layout.sensors);
   double peak_Pa = 0.0, squares = 0.0, readings = 0.0;
-  std::vector<double> misfits;
+  std::vector<double> misfits, of_sensor, counts;
   const auto look = [&] {
     peak_Pa = std::exp(global[layout.log_peak()]);
     squares = readings = 0.0;
     misfits.clear();
+    of_sensor.assign(array.sensors(), 0.0);
+    counts = of_sensor;
     const Local sd = model.local_sd();
     for (std::size_t i = 0; i < placements.size(); i++) {
       const Local &local = locals[i];
@@ -206,6 +224,8 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
           const double left = model.residual(optimiser.at, i, k);
           const double expected = model.expected_sd(placements[i], k);
           left_squares += left * left;
+          of_sensor[std::size_t(k)] += optimiser.kept[i] ? left * left : 0.0;
+          counts[std::size_t(k)] += optimiser.kept[i];
           misfit += left * left / (expected * expected);
           count += 1.0;
         }
@@ -275,7 +295,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
     const int width = layout.own_width(k);
     const double reading = of_gains(k, k) + 2.0 * OWN_WIDTH_SQUARE * covariance(k, width) +
                            OWN_WIDTH_SQUARE * OWN_WIDTH_SQUARE * covariance(width, width) +
-                           PLACE_SLOPE * PLACE_SLOPE * 0.5 *
+                           OWN_WIDTH_SQUARE * 0.5 *
                                (covariance(layout.dx(k), layout.dx(k)) + covariance(layout.dy(k), layout.dy(k))) *
                                std::exp(-2.0 * global[layout.log_width()]);
     solution.reading_sd.push_back(std::sqrt(std::max(reading, of_gains(k, k))));
@@ -285,6 +305,8 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
     solution.dx_mm.push_back(global[layout.dx(k)]);
     solution.dy_mm.push_back(global[layout.dy(k)]);
     solution.memory.push_back(global[layout.memory(k)]);
+    solution.misfit_share.push_back(std::sqrt(of_sensor[std::size_t(k)] / std::max(counts[std::size_t(k)], 1.0)) /
+                                    peak_Pa);
     solution.own_width.push_back(global[layout.own_width(k)]);
   }
   solution.peak_Pa = peak_Pa * mean;
@@ -309,7 +331,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
   };
   const auto [width, dip_share] = near(solution.mixing);
   solution.sigma_mm = solution.width_mm * width;
-  solution.dip_share = solution.sigma_mm < DIP_FROM_PITCHES * array.pitch_mm ? 0.0 : dip_share;
+  solution.dip_share = dip_share;
   solution.dip_sd_mm = solution.dip_widths * solution.width_mm;
   /* Derivatives by the width and the mixing, which counteract each other. */
   constexpr double STEP = 0.05;

@@ -9,17 +9,17 @@
  *                                 - h exp(-R / 2 B^2 S^2) + (t1 u + t2 v) / S P(R / S^2)] + o_k - r_k M_k,
  *   S = s exp(w + b_k),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v
  *
- * One profile for all: peak A, widths s and B and mixing m are fitted along, so nothing need be
+ * One profile for all: peak A, width s, the dip's over it B and mixing m are fitted along, so nothing need be
  * known of the pad or the foot. The mixture of two Gaussians is within 0.33 % of the peak of the
  * pressure under spheres and flat ends on 6, 9 and 12 mm of bonded rubber (the twin's tables, 3 and
  * 10 N), where one Gaussian is off by up to 3.4 %. Widths per placement (w) keep the force,
  * 2 pi A s^2.
- * Cast rubber has a dip (h) around that: -1 to -2 % of the peak three to five widths away, on every
+ * Cast rubber has a dip (h, of the width B S) around that: -1 to -2 % of the peak three to five widths away, on every
  * pad of host_tools/report/real; bonded rubber in the twin has none.
  *
  * A touch of unknown strength and width cannot determine a tilt and a bowl of the gains over the
  * pad: they move and widen the Gaussian. Only the equal force of all placements (e, up to
- * Assumptions::force_sd) determines them, less surely than the rest. They are the gauge: the
+ * Assumptions::force) determines them, less surely than the rest. They are the gauge: the
  * subspace of log gains that 1, x, y and x^2 + y^2 span over the sensors.
  *
  * All else that a session may hold is in the model with a prior around nothing, so that it neither
@@ -60,11 +60,19 @@ struct Placement {
   std::vector<double> reading_Pa; /* [sensor] above zero, mean over the frames */
   std::uint32_t usable = 0;       /* bitmap of the sensors whose reading is a measurement */
   std::vector<double> rest_Pa;    /* [sensor] just before it, of any origin; empty: not known */
-  std::vector<double> earlier_Pa; /* [sensor] M: of the placements before it what is left, fading in PAST_s;
-                                     empty: none */
+  std::vector<double> earlier_Pa; /* [sensor] M: what is left of those before (set_earlier); empty: none */
   double noise_Pa = 0.0;          /* sd of a mean */
   double fading = 0.0;            /* share of them that the readings together lose in the half second */
 };
+
+/* Rubber's after-effects fade with 1 to 4 s. */
+constexpr double PAST_s = 3.0;
+/* Sets earlier_Pa of all placements of a session, in the order of time. judge() does. */
+void set_earlier(std::vector<Placement> &placements);
+
+/* From the middle of the rest before a contact, 0.1 to 0.6 s, over the 0.3 s in which a hand sets a weight down, to the
+ * middle of the readings. */
+constexpr double RESTED_BEFORE_s = 1.4;
 
 /* The upper one of an even number; of none undefined. */
 double median(std::vector<double> values);
@@ -98,8 +106,6 @@ struct Assumptions {
   double peak = 0.15;
 };
 
-/* Rubber's after-effects fade with 1 to 4 s. */
-constexpr double PAST_s = 3.0;
 /* Width of the narrow part of the profile over that of the wide one. */
 constexpr double NARROW = 0.64;
 /* m of the profile of a bonded layer of 12 mm under a foot of 15 mm (pad/profile.hpp). */
@@ -110,14 +116,9 @@ constexpr struct { double strength, ratio; } PULL[] = {{0.357, 0.846}, {0.1743, 
 /* B / S that is expected: about as wide as the array of the recording of host_tools/report/real that chooses can still
  * distinguish from zeros that were off. */
 constexpr double DIP_WIDTHS = 5.0;
-/* An own width b takes b R / S^2 of a reading. The readings that locate a contact have
- * R / S^2 of 1 to 2. */
+/* An own width b takes b R / S^2 of a reading, a place that is off by d along u takes u d / S^2. The readings that
+ * locate a contact have R / S^2 of 1 to 2. */
 constexpr double OWN_WIDTH_SQUARE = 1.5;
-/* A place that is off by d takes u d / S^2 of a reading. The readings that locate a contact have u / S of some 1.2. */
-constexpr double PLACE_SLOPE = 1.2;
-/* A narrower response has two solutions with a dip, of which the firmware's fit may find the wrong one: it gets none.
- * Real pads of 0.27 pitches are 1.3 to 1.6 mm off without, 2 to 2.6 with; of 0.33 pitches 0.7 and 0.4. */
-constexpr double DIP_FROM_PITCHES = 0.3;
 /* In residual standard deviations: where a reading's weight begins to fall. */
 constexpr double HUBER = 2.5;
 
@@ -147,6 +148,7 @@ struct Solution {
   std::vector<double> dx_mm, dy_mm;            /* of the sensors from the layout */
   std::vector<double> own_width;               /* b: log */
   std::vector<double> memory;                  /* r */
+  std::vector<double> misfit_share;            /* rms of what the model leaves of a sensor's readings, of the peak */
   double ellipse_of_all[2] = {0.0, 0.0}, ellipse_of_all_sd[2] = {0.0, 0.0};
   double peak_Pa = 0.0; /* A, of a sensor of mean gain */
   double width_mm = 0.0, mixing = 0.0;

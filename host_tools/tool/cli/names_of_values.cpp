@@ -55,18 +55,21 @@ std::string shape_text(const calibration &calibration) {
          fixed(100.0 * calibration.dip_share_q16 / 65536.0, 1) + " % of its peak";
 }
 
-void print_gains(const calibration &calibration, std::uint8_t sensor_count) {
+void print_gains(const calibration &calibration, std::uint8_t sensor_count, const std::vector<double> &misfit_share) {
   constexpr int HALF = 10;
   constexpr double PER_MARK = 0.02;
   const bool has_places =
       std::any_of(calibration.sensors, calibration.sensors + sensor_count, [](const sensor_calibration &sensor) {
         return sensor.off_x_um != 0 || sensor.off_y_um != 0 || sensor.wider_q15 != 0;
       });
-  std::printf("\nsensor    gain    sd %%%s   -20 %%      mean      +20 %%\n",
-              has_places ? "  off by x, y mm  wider by %" : "");
+  std::printf("\nsensor    gain    sd %%%s%s   -20 %%      mean      +20 %%\n",
+              misfit_share.empty() ? "" : "  misfit %", has_places ? "  off by x, y mm  wider by %" : "");
   for (int k = 0; k < sensor_count; k++) {
     const sensor_calibration &sensor = calibration.sensors[k];
-    char place[64] = "";
+    char misfit[16] = "", place[64] = "";
+    if (!misfit_share.empty()) {
+      std::snprintf(misfit, sizeof misfit, "%10.2f", 100.0 * misfit_share[static_cast<std::size_t>(k)]);
+    }
     if (has_places) {
       std::snprintf(place, sizeof place, "%+9.2f %+6.2f  %+10.1f", 1e-3 * sensor.off_x_um, 1e-3 * sensor.off_y_um,
                     100.0 * std::expm1(sensor.wider_q15 / 32768.0));
@@ -75,9 +78,9 @@ void print_gains(const calibration &calibration, std::uint8_t sensor_count) {
         std::clamp(static_cast<int>(std::lround((static_cast<double>(sensor.gain) - 1) / PER_MARK)), -HALF, HALF);
     std::string below(static_cast<std::size_t>(std::max(-marks, 0)), '#');
     std::string above(static_cast<std::size_t>(std::max(marks, 0)), '#');
-    std::printf("%6d  %6.3f  %6.1f%s   %*s%s|%s\n", k, static_cast<double>(sensor.gain),
-                100.0 * static_cast<double>(sensor.gain_sd), place, HALF + 2 - static_cast<int>(below.size()), "",
-                below.c_str(), above.c_str());
+    std::printf("%6d  %6.3f  %6.1f%s%s   %*s%s|%s\n", k, static_cast<double>(sensor.gain),
+                100.0 * static_cast<double>(sensor.gain_sd), misfit, place, HALF + 2 - static_cast<int>(below.size()),
+                "", below.c_str(), above.c_str());
   }
 }
 

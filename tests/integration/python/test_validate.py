@@ -240,9 +240,8 @@ class MarksFit(unittest.TestCase):
             at = (np.array(mark) + self.HAND_mm * random.standard_normal(2)) @ turned + self.SHIFT_mm
             square = (ARRAY.x_mm - at[0]) ** 2 + (ARRAY.y_mm - at[1]) ** 2
             reading = gain * self.PEAK_Pa * np.exp(-0.5 * square / self.WIDTH_mm**2)
-            presses.append(
-                Press(number % MARKS + 1, *mark, Placement(10.0 * number, reading, np.ones(SENSORS, bool), 1.0, 0.0), Estimate())
-            )
+            placement = Placement(10.0 * number, reading, np.ones(SENSORS, bool), np.zeros(SENSORS), 1.0, 0.0)
+            presses.append(Press(number % MARKS + 1, *mark, placement, Estimate()))
             places.append(at)
         return presses, np.array(places), gain
 

@@ -111,6 +111,10 @@ TEST(Placements, zeros_that_are_off_or_move_do_not_matter) {
   EXPECT_LT(feed.error(feed.found[0]), 0.003);
   EXPECT_EQ(feed.found[0].usable, 0x7FFFu);
   EXPECT_EQ(feed.found[1].usable, feed.valid);
+  for (std::size_t k = 0; k < 15; k++) {
+    const double rest_s = feed.found[0].t_s - RESTED_BEFORE_s;
+    EXPECT_NEAR(feed.found[0].rest_Pa[k], AMBIENT_Pa + 10.0 * static_cast<double>(k) + feed.drift_Pa_s * rest_s, 4.0);
+  }
 }
 
 TEST(Placements, one_for_each_until_it_is_lifted) {

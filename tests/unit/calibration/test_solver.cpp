@@ -127,8 +127,8 @@ TEST(Solver, what_presses_far_away_makes_no_dip) {
   EXPECT_LT(s.dip_share, 0.001);
 }
 
-/* A tilt alone is what touches of unknown strength do not tell. */
-TEST(Solver, one_weight_tells_a_tilt_and_a_bowl) {
+/* Touches of unknown strength do not. */
+TEST(Solver, one_weight_determines_a_tilt_and_a_bowl) {
   for (int kind = 0; kind < 2; kind++) {
     KnownPad pad(4, 0.0);
     for (std::size_t k = 0; k < 15; k++) {
@@ -157,7 +157,7 @@ TEST(Solver, standard_deviations_are_honest) {
   }
 }
 
-/* Sensors of real pads feel a contact wider or narrower by some percent. */
+/* Of sensors of real pads a contact is wider or narrower by some percent. */
 TEST(Solver, own_widths_are_found_and_pass_for_no_gains) {
   for (double spread : {0.0, 0.07}) {
     Honesty honesty;
@@ -210,7 +210,7 @@ TEST(Solver, the_record_holds_where_each_sensor_is_and_how_wide) {
   EXPECT_EQ(made.sensors[1].wider_q15, CALIBRATION_WIDER_MAX_Q15);
 }
 
-TEST(Solver, more_placements_tell_more) {
+TEST(Solver, more_placements_determine_more) {
   const KnownPad pad(5);
   const auto placements = good_session(pad, 40, 5);
   double before = 1.0;
@@ -242,8 +242,7 @@ TEST(Solver, sees_what_a_session_holds) {
     placement.reading_Pa[4] += 300.0;
   }
   const Solution zeros = solve(pad.array, moved);
-  EXPECT_NEAR(zeros.offset_Pa[4], 300.0, 60.0);
-  EXPECT_NEAR(zeros.offset_Pa[0], 0.0, 60.0);
+  EXPECT_NEAR(zeros.offset_Pa[4] - zeros.offset_Pa[0], 300.0, 5.0); /* what all share looks like a wide dip */
 
   pad.x_mm[12] += 0.6;
   const Solution layout = solve(pad.array, good_session(pad, 30, 7));
@@ -258,48 +257,42 @@ TEST(Solver, sees_what_a_session_holds) {
   EXPECT_NEAR(shape.ellipse_of_all[1], 0.0, 0.02);
 }
 
-/* What a sensor keeps of the placement before fades between the rest and the readings. */
-TEST(Solver, tells_what_remains_of_the_placement_before) {
+/* What a sensor keeps of the placements before fades between the rest and the readings. */
+TEST(Solver, finds_what_remains_of_the_placements_before) {
   const KnownPad pad(8);
-  const auto placements = good_session(pad, 30, 8);
-  auto felt = placements;
-  for (std::size_t i = 0; i < felt.size(); i++) {
-    felt[i].earlier_Pa = i ? placements[i - 1].reading_Pa : std::vector<double>(15, 0.0);
-    for (std::size_t k = 0; k < 15; k++) {
-      felt[i].reading_Pa[k] -= 0.01 * (static_cast<double>(k % 5) - 2.0) * felt[i].earlier_Pa[k];
+  auto placements = good_session(pad, 30, 8);
+  for (std::size_t i = 0; i < 30; i++) {
+    placements[i].t_s = PAST_s * double(i);
+  }
+  set_earlier(placements);
+  auto remembering = placements;
+  for (std::size_t k = 0; k < 15; k++) {
+    EXPECT_EQ(placements[0].earlier_Pa[k], 0.0);
+    const double left_Pa = placements[1].reading_Pa[k] + placements[0].reading_Pa[k] / M_E;
+    EXPECT_NEAR(placements[2].earlier_Pa[k], left_Pa / M_E, 1e-9);
+    for (std::size_t i = 0; i < 30; i++) {
+      remembering[i].reading_Pa[k] -= 0.01 * (static_cast<double>(k % 5) - 2.0) * placements[i].earlier_Pa[k];
     }
   }
-  const Solution s = solve(pad.array, felt), without = solve(pad.array, placements);
+  const Solution s = solve(pad.array, remembering), without = solve(pad.array, placements);
   for (std::size_t k = 0; k < 15; k++) {
-    EXPECT_NEAR(s.memory[k], 0.01 * (static_cast<double>(k % 5) - 2.0), 0.003) << k;
-    EXPECT_NEAR(s.gain[k], without.gain[k], 0.004) << k;
+    EXPECT_NEAR(s.memory[k] - without.memory[k], 0.01 * (static_cast<double>(k % 5) - 2.0), 0.002) << k;
+    EXPECT_NEAR(s.gain[k], without.gain[k], 0.002) << k;
   }
 }
 
-/* A pad aslant: a tangential force that all placements share, as PULL has it. */
-TEST(Solver, tells_a_slope_from_gains) {
+/* A pad aslant: a tangential force that all placements share. The bump is no layer: its pull passes in part for places.
+ */
+TEST(Solver, distinguishes_a_slope_from_gains) {
   const KnownPad pad(12);
-  constexpr double SLOPE = 0.17, WIDE_mm = 5.6;
-  auto level = good_session(pad, 30, 12), slanting = level;
-  Random random(12, 2, 0);
-  for (std::size_t i = 0; i < level.size(); i++) {
-    const double x = random.uniform(-9.0, 9.0), y = random.uniform(-18.0, 18.0);
-    for (std::size_t k = 0; k < 15; k++) {
-      const double u = pad.array.x_mm[k] - x, v = pad.array.y_mm[k] - y, r_mm = std::hypot(u, v);
-      double pulled = 0.0;
-      for (const auto &[strength, ratio] : PULL) {
-        pulled += strength * bell(r_mm, ratio * WIDE_mm);
-      }
-      slanting[i].reading_Pa[k] += pad.gain[k] * KnownPad::PEAK_Pa * SLOPE * u / WIDE_mm * pulled;
-      random.normal();
-    }
-  }
-  const Solution flat = solve(pad.array, level), slope = solve(pad.array, slanting);
+  constexpr double SLOPE = 0.17;
+  const Solution flat = solve(pad.array, good_session(pad, 30, 12));
+  const Solution slope = solve(pad.array, good_session(pad, 30, 12, SLOPE));
   EXPECT_NEAR(flat.pull[0], 0.0, 0.03);
-  EXPECT_NEAR(slope.pull[0] - flat.pull[0], SLOPE, 0.05); /* the bump is no layer */
+  EXPECT_NEAR(slope.pull[0] - flat.pull[0], 0.75 * SLOPE, 0.02);
   EXPECT_NEAR(slope.pull[1], flat.pull[1], 0.02);
   for (std::size_t k = 0; k < 15; k++) {
-    EXPECT_NEAR(slope.gain[k] / flat.gain[k], 1.0, 0.015) << k;
+    EXPECT_NEAR(slope.gain[k] / flat.gain[k], 1.0, 0.01) << k;
   }
 }
 
@@ -338,7 +331,7 @@ TEST(Solver, is_deterministic_and_refuses_nonsense) {
 }
 
 /* Placements where they are wanted are worth more than placements anywhere. */
-TEST(Solver, wants_the_place_that_tells_most) {
+TEST(Solver, wants_the_place_that_helps_most) {
   const KnownPad pad(11);
   Random random(11, 3, 0);
   for (double bare : {1.0, -1.0}) { /* none at the upper end; at the lower */

@@ -91,7 +91,10 @@ def solve_gains(array, placements, force_N):
     if not tool:
         raise InputError("the command fingertip solves the gains, and is not installed; install it, or name it in FINGERTIP_TOOL")
     asked = {"x_mm": list(array.x_mm), "y_mm": list(array.y_mm), "pitch_mm": array.pitch_mm, "force_N": force_N}
-    own = ({"usable": np.flatnonzero(one.usable).tolist(), "reading_Pa": list(one.reading_Pa)} for one in placements)
+    own = (
+        {"usable": np.flatnonzero(one.usable).tolist(), "reading_Pa": list(one.reading_Pa), "rest_Pa": list(one.rest_Pa)}
+        for one in placements
+    )
     asked["placements"] = [one._asdict() | lists for one, lists in zip(placements, own)]
     done = subprocess.run([tool, "calibrate", "--placements"], input=json.dumps(asked), capture_output=True, text=True, check=False)
     if done.returncode != 0:
@@ -273,11 +276,13 @@ class Card:
         """Gains, width and dip, from the readings at the places where they belong."""
         placements = []
         for press in self.measured.presses:
-            usable, reading_Pa = np.zeros(self.sensors, bool), press.placement.reading_Pa.copy()
-            for k in np.flatnonzero(press.placement.usable & ~self._dead & ~self._loose):
+            at = press.placement
+            usable, reading_Pa, rest_Pa = np.zeros(self.sensors, bool), at.reading_Pa.copy(), at.rest_Pa.copy()
+            for k in np.flatnonzero(at.usable & ~self._dead & ~self._loose):
                 if not usable[self.place[k]]:
-                    usable[self.place[k]], reading_Pa[self.place[k]] = True, press.placement.reading_Pa[k]
-            placements.append(press.placement._replace(usable=usable, reading_Pa=reading_Pa))
+                    to = self.place[k]
+                    usable[to], reading_Pa[to], rest_Pa[to] = True, at.reading_Pa[k], at.rest_Pa[k]
+            placements.append(at._replace(usable=usable, reading_Pa=reading_Pa, rest_Pa=rest_Pa))
         self.solution = solve_gains(self.array, placements, self.weight_N)
         self.gain, self.gain_sd = np.zeros(self.sensors), np.zeros(self.sensors)
         if not self.solution["solved"]:

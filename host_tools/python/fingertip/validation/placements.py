@@ -1,9 +1,9 @@
 """Finds presses in a stream of frames: a weight is set down, rests, and is lifted again. As host_tools/tool/calibration/placements.cpp,
 which has the reasons of the limits.
 
-Frames of 12 a second or more; all times are the frames' own. Absolute pressures alone, against those just before, decide what touches the
-pad. A contact begins where a reading rises by TOUCH_Pa within a second. It is a placement once it was still for a second: its reading is the
-mean from 0.5 to 1 s, above the mean of the half second before the contact.
+Frames of 12 a second or more; all times are the frames' own. Pressures above the firmware's zero, against those just before, decide what
+touches the pad: what the zero fades by in a contact is taken off. A contact begins where a reading rises by TOUCH_Pa within a second. It is a
+placement once it was still for a second: its reading is the mean from 0.5 to 1 s, above the mean of the half second before the contact.
 """
 
 import collections
@@ -32,11 +32,13 @@ class Reading(NamedTuple):
 
 
 class Placement(NamedTuple):
-    """reading_Pa: above the level before, where usable. noise_Pa: sd of such a mean. fading: share that the readings lose in half a second."""
+    """reading_Pa: above the level before, where usable. rest_Pa: that level, absolute. noise_Pa: sd of such a mean. fading: share that the readings
+    lose in half a second."""
 
     t_s: float
     reading_Pa: np.ndarray
     usable: np.ndarray
+    rest_Pa: np.ndarray
     noise_Pa: float
     fading: float
 
@@ -51,7 +53,7 @@ class _Slot:
     def add(self, reading):
         self.frames += 1
         self.counts += reading.valid
-        self.means += np.where(reading.valid, reading.pressure_Pa - self.means, 0.0) / np.maximum(self.counts, 1)
+        self.means += np.where(reading.valid, reading.pressure_Pa - reading.zero_Pa - self.means, 0.0) / np.maximum(self.counts, 1)
 
 
 class PlacementFinder:
@@ -76,8 +78,10 @@ class PlacementFinder:
                 self._ahead_s += self._last_s + GAP_s - t_s
                 t_s = self._last_s + GAP_s
         self._last_s = t_s
+        if self.state == "resting":
+            self._zero_Pa = reading.zero_Pa
         if not self._begun:
-            self._begun, self._zero_Pa, self._rest_from_s = True, reading.zero_Pa, t_s
+            self._begun, self._rest_from_s = True, t_s
         found = None
         if self._open and t_s >= self._open.begin_s + SLOT_s:
             found = self._close(self._open)
@@ -103,7 +107,7 @@ class PlacementFinder:
         end_s = t_s - BEFORE_TOUCH_s
         slots = self._between(max(end_s - REST_s, self._rest_from_s), end_s)
         if self._rest_Pa is None:
-            self._rest_Pa = np.array(self._zero_Pa, float)
+            self._rest_Pa = np.zeros(self._sensors)
         if slots:
             means, seen = self._mean_of(slots)
             self._rest_Pa = np.where(seen, means, self._rest_Pa)
@@ -174,5 +178,5 @@ class PlacementFinder:
             self.state, self.refusal = "refused", "unsteady"
         elif still:
             self.state = "taken"
-            return Placement(0.5 * (begin_s + t_s), reading, seen, noise_Pa, -common / max(total, 1))
+            return Placement(0.5 * (begin_s + t_s), reading, seen, self._rest_Pa + self._zero_Pa, noise_Pa, -common / max(total, 1))
         return None

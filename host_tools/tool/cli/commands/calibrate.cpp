@@ -5,7 +5,6 @@
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/packet_fields.hpp"
-#include "libfingertip/recording_reader.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/profile.hpp"
@@ -27,7 +26,6 @@ extern "C" {
 #include <cstring>
 #include <ctime>
 #include <functional>
-#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <poll.h>
@@ -179,7 +177,7 @@ void print_result(const GainSession &work, const calibration &made, std::optiona
   const calibrating::Scatter before = work.scatter(false), after = work.scatter(true);
   std::printf("%s, from %zu of %zu placements\n", judgement.text.c_str(), judgement.solution.kept,
               work.placements().size());
-  print_gains(made, static_cast<std::uint8_t>(work.array().sensors()));
+  print_gains(made, static_cast<std::uint8_t>(work.array().sensors()), judgement.solution.misfit_share);
   std::printf("\nof the placements      before     after\n");
   std::printf("location off by     %6.2f mm %6.2f mm   median\n", before.location_mm, after.location_mm);
   std::printf("force differs by    %6.1f %%  %6.1f %%    median\n", 100.0 * before.force, 100.0 * after.force);
@@ -421,12 +419,13 @@ Asked asked_of(const nlohmann::json &text) {
     Placement placement;
     each.at("t_s").get_to(placement.t_s);
     each.at("reading_Pa").get_to(placement.reading_Pa);
+    each.at("rest_Pa").get_to(placement.rest_Pa);
     each.at("noise_Pa").get_to(placement.noise_Pa);
     each.at("fading").get_to(placement.fading);
     for (std::size_t k : each.at("usable")) {
       placement.usable |= k < sensors ? std::uint32_t{1} << k : 0u;
     }
-    if (placement.reading_Pa.size() != sensors) {
+    if (placement.reading_Pa.size() != sensors || placement.rest_Pa.size() != sensors) {
       throw Error("a placement has " + std::to_string(placement.reading_Pa.size()) + " readings, and there are " +
                   std::to_string(sensors) + " sensors");
     }
@@ -479,8 +478,8 @@ nlohmann::json found_in(const Asked &asked) {
 /* fingertip calibrate --placements, for programs that find placements themselves, as the package's
  * `validate` does. Reads JSON from standard input:
  *   x_mm, y_mm      [sensor]     pitch_mm     force_N of the weight
- *   placements      of each t_s, reading_Pa [sensor], usable (numbers of the sensors whose reading is
- *                   a measurement), noise_Pa, fading (calibration/solver.hpp)
+ *   placements      in the order of time, of each t_s, reading_Pa, rest_Pa [sensor], usable (numbers of the sensors
+ *                   whose reading is a measurement), noise_Pa, fading (calibration/solver.hpp)
  * Prints the solution as JSON; without "solved" the placements are too few. Throws Error. */
 int calibrate_placements() {
   try {
