@@ -118,14 +118,18 @@ RobotiqGripper::RobotiqGripper(const GripperWay &given)
   modbus_set_response_timeout(modbus_, timeout_us / 1'000'000, timeout_us % 1'000'000);
   modbus_set_byte_timeout(modbus_, 0, GAP_us);
   try {
+    std::optional<Error> garbled;
     for (const int function : {4, 3}) {
       read_function_ = function;
       try {
         meet();
         return;
       } catch (const Error &error) {
+        if (error.code() == ErrorCode::gripper_garbled && !garbled) {
+          garbled = error;
+        }
         if (function == 3 || error.code() == ErrorCode::gone) {
-          throw;
+          throw garbled && error.code() == ErrorCode::gripper_silent ? *garbled : error;
         }
       }
     }
