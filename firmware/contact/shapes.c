@@ -59,7 +59,8 @@ static void put_report(const struct shapes_question *question, const struct fit_
     report->edge_length_mm = result->length_mm;
   }
   if (result->shape == FIT_SHAPE_ROUND) {
-    report->doubt = fmaxf(result->chi_square[0] / (float)FIT_SHAPES_ERRORS, 1.0f);
+    const float chi_square = fminf(result->chi_square[0], result->chi_square[1]);
+    report->doubt = fmaxf(chi_square / (float)FIT_SHAPES_ERRORS, 1.0f);
   }
   if (result->shape == FIT_SHAPE_PULLED || result->shape == FIT_SHAPE_ELONGATED) {
     report->from_fit_x_mm = result->x_mm[0] - question->fit.x_mm;

@@ -17,7 +17,7 @@
 /* The best of the models explains nothing if its chi^2 is above that. */
 #define CHI_SQUARE_MAX 100
 
-static const uint8_t unknowns_of[MODELS] = {SPAN_X, UNKNOWNS, PULL_Y};
+static const uint8_t unknowns_of[MODELS] = {BALANCE, UNKNOWNS, PULL_Y};
 
 static int32_t place_q20(const struct fit_shapes_pad *pad, float mm) {
   return fixed_mul_q28(fixed_clamp(fit_fixed(mm, 20), -(1 << 29), 1 << 29), pad->per_pitch_q28);
@@ -63,9 +63,8 @@ static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fi
       value[PLACE_Y] += dy_q20;
       value[PLACE_X] = fixed_clamp(value[PLACE_X], -PLACE_X_MAX, PLACE_X_MAX);
       value[PLACE_Y] = fixed_clamp(value[PLACE_Y], -PLACE_Y_MAX, PLACE_Y_MAX);
-      if (m == LONG) {
-        value[PULL_X] = shifted(fixed_mul_16(value[PULL_X], share_q13), 3);
-        value[PULL_Y] = shifted(fixed_mul_16(value[PULL_Y], share_q13), 3);
+      for (int u = m == ROUND ? SPAN_X : PULL_X; m != TWO && u < unknowns_of[m]; u++) {
+        value[u] = shifted(fixed_mul_16(value[u], share_q13), 3);
       }
     }
   }

@@ -5,25 +5,31 @@
 
 #include <math.h>
 
-#define LINE_SURE 8               /* variances: a line whose square is less is a pull */
-#define SEPARATION_HALF_Q10 256   /* of half a pitch: nearer pairs are long contacts */
-#define BESIDE_Q20 (1 << 19)      /* half a pitch */
-#define SQUARE 3                  /* half a square's side, squared, over its spread */
-#define LEAST_SPREAD_CHI_SQUARE 8 /* no contact has that */
-#define LONGEST_HALF_Q10 1408     /* of 11/4 pitches: a longer line is rarer than a pair */
+#define PULL_SURE 2.83f     /* standard deviations: what pulls less is round */
+#define EDGE_SURE 0.5f      /* standard deviations by which a line is longer than the shortest edge */
+#define PULL_MODEL_SD 0.04f /* pitches^2 per Q / F: variance along a line by what the model of a pull is off by */
+#define THIRD_Q16 21845
+#define LEAST_VARIANCE_Q20 (ONE_Q20 / 15) /* of a line of 0.9 pitches: shorter ones are no edges */
+#define SEPARATION_HALF_Q10 256           /* of half a pitch: nearer pairs are long contacts */
+#define BESIDE_Q20 (1 << 19)              /* half a pitch */
+#define SQUARE 3                          /* half a square's side, squared, over its spread */
+#define LEAST_SPREAD_CHI_SQUARE 8         /* no contact has that */
+#define LONGEST_HALF_Q10 1408             /* of 11/4 pitches: a longer line is rarer than a pair */
 
-/* Variance of a sum of two unknowns times these, each at most some pitches or units of the
- * readings. */
-static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equations, int first, int32_t a_q20,
-                                          int second, int32_t b_q20) {
+/* Variance of a sum of the unknowns times these, each at most some pitches or units of the readings. */
+static NOINLINE struct scaled variance_of_sum(const struct fit_shapes_equations *equations, const int32_t *by_q20) {
   const int32_t(*matrix)[UNKNOWNS] = equations->matrix;
-  int32_t w_q10[UNKNOWNS], sum_q13 = 0;
-  int32_t q = equations->q[first] > equations->q[second] ? equations->q[first] : equations->q[second];
-  int32_t a_q10 = shifted(a_q20, equations->q[first] - q - 10);
-  int32_t b_q10 = shifted(b_q20, equations->q[second] - q - 10);
-  for (int j = 0; j < equations->count; j++) {
-    int32_t w = (j == first ? a_q10 : 0) + (j == second ? b_q10 : 0);
-    for (int i = 0; i < j; i++) {
+  int32_t w_q10[UNKNOWNS], sum_q13 = 0, q = INT8_MIN;
+  int first = 0;
+  while (by_q20[first] == 0) {
+    first++;
+  }
+  for (int j = first; j < equations->count; j++) {
+    q = by_q20[j] != 0 && equations->q[j] > q ? equations->q[j] : q;
+  }
+  for (int j = first; j < equations->count; j++) {
+    int32_t w = by_q20[j] != 0 ? shifted(by_q20[j], equations->q[j] - q - 10) : 0;
+    for (int i = first; i < j; i++) {
       w -= (matrix[j][i] * w_q10[i]) >> 14;
     }
     w = fixed_clamp(w * (1 << equations->half[j]), -INT16_MAX, INT16_MAX);
@@ -31,6 +37,14 @@ static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equ
     sum_q13 += (((w * w) >> 13) * (equations->inverse_q14[j] >> 4)) >> 4;
   }
   return fit_scaled_from(sum_q13, 2 * q - 30 - 13);
+}
+
+static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equations, int first, int32_t a_q20,
+                                          int second, int32_t b_q20) {
+  int32_t by_q20[UNKNOWNS] = {0};
+  by_q20[first] = a_q20;
+  by_q20[second] += b_q20;
+  return variance_of_sum(equations, by_q20);
 }
 
 static float mm(const struct fit_shapes_pad *pad, int32_t place_q20) {
@@ -46,9 +60,11 @@ struct scales {
   struct scaled unit, variance, pitch;
 };
 
-static float sd_of(struct scaled scale, struct scaled form, struct scaled variance) {
+static NOINLINE float sd_of(struct scaled scale, struct scaled form, struct scaled variance) {
   return product_of(scale, fit_scaled_sqrt(scaled_mul(fit_scaled_short(form), variance)));
 }
+
+static const struct scaled one = {1 << 14, -14};
 
 static NOINLINE void put_two(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations,
                              const int32_t *at, const struct scales *scales, struct fit_shapes_result *result) {
@@ -67,31 +83,53 @@ static NOINLINE void put_two(const struct fit_shapes_pad *pad, const struct fit_
   }
 }
 
-static NOINLINE void put_line(const struct fit_shapes_equations *equations, const int32_t *at,
-                              const struct scales *scales, struct fit_shapes_result *result) {
-  result->shape = FIT_SHAPE_PULLED;
-  result->qx_N = product_of(scales->unit, fit_scaled_from(at[PULL_X], -20));
-  result->qy_N = product_of(scales->unit, fit_scaled_from(at[PULL_Y], -20));
-  struct scaled x = fit_scaled_from(at[SPAN_X], -20), y = fit_scaled_from(at[SPAN_Y], -20);
-  struct scaled square = fit_scaled_short(scaled_add(scaled_mul(x, x), scaled_mul(y, y)));
-  if (square.mantissa <= 0) {
+/* Of two unknowns behind one another. */
+static NOINLINE float sd_of_both(const struct fit_shapes_equations *equations, int first, const struct scales *scales) {
+  struct scaled both = scaled_add(variance_of(equations, first, ONE_Q20, first + 1, 0),
+                                  variance_of(equations, first + 1, ONE_Q20, first, 0));
+  return sd_of(one, both, scales->variance);
+}
+
+/* Along an edge the contact's variance is larger than across, by that of a line. */
+static NOINLINE bool is_edge(const struct fit_shapes_equations *equations, const struct fit_shapes_at *at,
+                             const struct scales *scales, float pull_sd) {
+  int32_t more_q20 = fixed_mul_16(fit_shapes_span_square(at->value), THIRD_Q16) - at->value[SPREAD];
+  int32_t by_q20[UNKNOWNS] = {[SPREAD] = -ONE_Q20};
+  by_q20[SPAN_X] = 2 * fixed_mul_16(at->value[SPAN_X], THIRD_Q16);
+  by_q20[SPAN_Y] = 2 * fixed_mul_16(at->value[SPAN_Y], THIRD_Q16);
+  float sd = sd_of(one, variance_of_sum(equations, by_q20), scales->variance);
+  return fit_float(more_q20 - LEAST_VARIANCE_Q20, -20) > EDGE_SURE * fit_quadrature(1.0f, sd, 1.0f, pull_sd);
+}
+
+static NOINLINE void put_edge(const struct fit_shapes_equations *equations, const int32_t *at,
+                              const struct scales *scales, float pull_sd, struct fit_shapes_result *result) {
+  float x = fit_float(at[SPAN_X], -20), y = fit_float(at[SPAN_Y], -20);
+  float reach = fit_quadrature(1.0f, fabsf(x), 1.0f, fabsf(y)), per = 1.0f / reach, along = x < 0.0f ? -per : per;
+  result->length_mm = 2.0f * fit_scaled_float(scales->pitch) * reach;
+  result->along_x = along * x;
+  result->along_y = along * y;
+  struct scaled across =
+      variance_of(equations, SPAN_X, fit_fixed(-result->along_y, 20), SPAN_Y, fit_fixed(result->along_x, 20));
+  result->angle_sd_rad = fit_quadrature(per, sd_of(one, across, scales->variance), 3.0f * per * per, pull_sd);
+}
+
+/* Of one contact: whether it is long, or else pulled. */
+static NOINLINE void put_kind(const struct fit_shapes_equations *equations, const struct fit_shapes_at *at,
+                              bool is_long, const struct scales *scales, struct fit_shapes_result *result) {
+  const int pull = equations->pull;
+  float x = fit_float(at->value[pull], -20), y = fit_float(at->value[pull + 1], -20);
+  float size = fit_quadrature(1.0f, fabsf(x), 1.0f, fabsf(y)), unit_N = fit_scaled_float(scales->unit);
+  float pull_sd = PULL_MODEL_SD * size / fit_float(at->value[AMPLITUDE], -20);
+  if (is_long && is_edge(equations, at, scales, pull_sd)) {
+    result->shape = FIT_SHAPE_ELONGATED;
+    put_edge(equations, at->value, scales, pull_sd, result);
+  } else if (size > PULL_SURE * sd_of_both(equations, pull, scales)) {
+    result->shape = FIT_SHAPE_PULLED;
+  } else {
     return;
   }
-  struct scaled reach = fit_scaled_sqrt(square);
-  int32_t ux_q20 = fit_scaled_to_fixed(scaled_div(x, reach), 20);
-  int32_t uy_q20 = fit_scaled_to_fixed(scaled_div(y, reach), 20);
-  struct scaled sure = scaled_mul(variance_of(equations, SPAN_X, ux_q20, SPAN_Y, uy_q20), scales->variance);
-  sure.mantissa *= LINE_SURE;
-  if (scaled_sub(square, fit_scaled_short(sure)).mantissa <= 0) {
-    return;
-  }
-  result->shape = FIT_SHAPE_ELONGATED;
-  int32_t sign = ux_q20 < 0 ? -1 : 1;
-  result->length_mm = 2.0f * product_of(scales->pitch, reach);
-  result->along_x = fit_float(sign * ux_q20, -20);
-  result->along_y = fit_float(sign * uy_q20, -20);
-  result->angle_sd_rad =
-      sd_of(fit_grid_reciprocal(reach), variance_of(equations, SPAN_X, -uy_q20, SPAN_Y, ux_q20), scales->variance);
+  result->qx_N = unit_N * x;
+  result->qy_N = unit_N * y;
 }
 
 static NOINLINE void put_one(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations,
@@ -99,21 +137,15 @@ static NOINLINE void put_one(const struct fit_shapes_pad *pad, const struct fit_
   result->x_mm[0] = mm(pad, pad->origin_x_q20 + at[PLACE_X]);
   result->y_mm[0] = mm(pad, pad->origin_y_q20 + at[PLACE_Y]);
   result->force_N[0] = product_of(scales->unit, fit_scaled_from(at[AMPLITUDE], -20));
-  struct scaled place = scaled_add(variance_of(equations, PLACE_X, ONE_Q20, PLACE_Y, 0),
-                                   variance_of(equations, PLACE_Y, ONE_Q20, PLACE_X, 0));
-  result->location_sd_mm[0] = sd_of(scales->pitch, place, scales->variance);
+  result->location_sd_mm[0] = fit_scaled_float(scales->pitch) * sd_of_both(equations, PLACE_X, scales);
   result->force_sd_N[0] = sd_of(scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
 }
 
-/* More unknowns must make the sum of chi^2 and FIT_SHAPES_ERRORS less by a quarter. */
-static bool explains_more(int32_t chi_square_q8, int32_t than_q8) {
+/* More unknowns must make the sum of chi^2 and FIT_SHAPES_ERRORS less by a quarter, or by a half. */
+enum { BY_A_HALF = 1, BY_A_QUARTER = 2 };
+static bool explains_more(int32_t chi_square_q8, int32_t than_q8, int by) {
   than_q8 += FIT_SHAPES_ERRORS << 8;
-  return than_q8 - (than_q8 >> 2) > chi_square_q8 + (FIT_SHAPES_ERRORS << 8);
-}
-
-static int32_t span_square_q20(const struct fit_shapes_at *at) {
-  int32_t x_q10 = at->value[SPAN_X] >> 10, y_q10 = at->value[SPAN_Y] >> 10;
-  return x_q10 * x_q10 + y_q10 * y_q10;
+  return than_q8 - (than_q8 >> by) > chi_square_q8 + (FIT_SHAPES_ERRORS << 8);
 }
 
 /* Where the line is long, the pair may leave a little more. */
@@ -125,7 +157,7 @@ static bool explains_as_well(int32_t chi_square_q8, int32_t than_q8) {
  * that is otherwise explains a wide contact, or what the models of a pull are off by. Of squares,
  * discs (4) and balls (5), squares of the same spread overlap last. */
 static bool can_be_two(const struct fit_shapes_at *pair) {
-  const int32_t *at = pair->value, square_q20 = span_square_q20(pair);
+  const int32_t *at = pair->value, square_q20 = fit_shapes_span_square(at);
   uint32_t reach_x = fixed_size(at[PLACE_X]) + fixed_size(at[SPAN_X]);
   uint32_t reach_y = fixed_size(at[PLACE_Y]) + fixed_size(at[SPAN_Y]);
   return square_q20 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10 && square_q20 > SQUARE * at[SPREAD] &&
@@ -134,15 +166,15 @@ static bool can_be_two(const struct fit_shapes_at *pair) {
 
 int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8, const struct fit_shapes_at *at) {
   int32_t round = chi_square_q8[ROUND], line = chi_square_q8[LONG], pair = chi_square_q8[TWO];
-  bool is_longest = span_square_q20(&at[LONG]) > LONGEST_HALF_Q10 * LONGEST_HALF_Q10;
+  bool is_longest = fit_shapes_span_square(at[LONG].value) > LONGEST_HALF_Q10 * LONGEST_HALF_Q10;
   /* A point's spread is 0, and the least is far from that. */
   bool is_narrow = fit_shapes_is_narrowest(pad, at[TWO].value[SPREAD]);
   int32_t doubted = pair + (is_narrow ? LEAST_SPREAD_CHI_SQUARE << 8 : 0);
-  bool is_no_line = is_longest ? explains_as_well(pair, line) : explains_more(doubted, line);
-  if (can_be_two(&at[TWO]) && explains_more(doubted, round) && is_no_line) {
+  bool is_no_line = is_longest ? explains_as_well(pair, line) : explains_more(doubted, line, BY_A_QUARTER);
+  if (can_be_two(&at[TWO]) && explains_more(doubted, round, BY_A_QUARTER) && is_no_line) {
     return TWO;
   }
-  return explains_more(line, round) ? LONG : ROUND;
+  return explains_more(line, round, BY_A_QUARTER) ? LONG : ROUND;
 }
 
 /* The middle of a model's forces. */
@@ -203,9 +235,8 @@ void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32
   } else {
     result->shape = FIT_SHAPE_ROUND;
     put_one(pad, equations, at->value, &scales, result);
-  }
-  if (best == LONG) {
-    put_line(equations, at->value, &scales, result);
+    bool is_long = best == LONG && explains_more(chi_square_q8[LONG], chi_square_q8[ROUND], BY_A_HALF);
+    put_kind(equations, at, is_long, &scales, result);
   }
   doubt_places(pad, best, chi_square_q8, state, result);
 }

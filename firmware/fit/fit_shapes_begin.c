@@ -22,7 +22,7 @@ static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad, stru
   int first = 0, second = -1;
   int32_t most = 0;
   struct terms terms;
-  fit_shapes_set_terms(pad, at->value[SPREAD], false, &terms);
+  fit_shapes_set_terms(pad, at->value[SPREAD], &terms);
   for (int k = 1; k < NODES; k++) {
     first = readings->q14[k] > readings->q14[first] ? k : first;
   }

@@ -7,7 +7,10 @@
 #include <stddef.h>
 
 #define FAR_WIDTHS 6.25f /* FAR: the dip that the recordings of real pads show */
-#define KAPPA_Q14 21299  /* 1.3, as in fit_tangential.c */
+#define LINE_Q16                                                                                                       \
+  5461 /* a twelfth of the line's square: half of what it adds to a spread, as steps do not know of it                 \
+        */
+#define KAPPA_Q14 21299 /* 1.3, as in fit_tangential.c */
 #define LOG2E_HALF_FLOAT 0.72134752f
 #define SQUARE_MAX_Q24 (40 << 24)
 
@@ -56,7 +59,7 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
   return FT_OK;
 }
 
-void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, bool pulls, struct terms *terms) {
+void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, struct terms *terms) {
   int32_t heights = 0;
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
     int32_t v_q26 = pad->variance_q26[j] + t_q20 * 64;
@@ -69,7 +72,10 @@ void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, bool 
   }
   terms->dip_q14 = fixed_mul_16(pad->room.frame.dip_share_q16, heights);
   terms->dip_k_q24 = pad->room.frame.dip_k_q24;
-  for (int j = 0; pulls && j < PAD_TANGENTIAL_TERMS; j++) {
+}
+
+static void set_pull_terms(const struct fit_shapes_pad *pad, int32_t t_q20, struct terms *terms) {
+  for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
     int32_t v_q26 = pad->pull_variance_q26[j] + fixed_mul_16(t_q20 * 64, KAPPA_Q14) * 4;
     int32_t over_q26 = fixed_div_q26(pad->pull_strength_q26[j] >> 2, v_q26 >> 2);
     terms->pull_k_q24[j] = fixed_div_q26(LOG2E_HALF_Q26 >> 2, v_q26 >> 2) >> 2;
@@ -214,11 +220,11 @@ static NOINLINE void add_blob(struct fit_shapes_pad *pad, const struct terms *te
   }
 }
 
-static NOINLINE void add_pull(struct fit_shapes_pad *pad, const struct terms *terms, const int32_t *at) {
+static NOINLINE void add_pull(struct fit_shapes_pad *pad, const struct terms *terms, const int32_t *at, int pull) {
   struct squares squares;
   struct bell bell[PAD_TANGENTIAL_TERMS];
   int32_t x_q12 = at[PLACE_X] >> 8, y_q12 = at[PLACE_Y] >> 8;
-  int32_t pull_x_q13 = at[PULL_X] >> 7, pull_y_q13 = at[PULL_Y] >> 7;
+  int32_t pull_x_q13 = at[pull] >> 7, pull_y_q13 = at[pull + 1] >> 7;
   fit_shapes_set_squares(x_q12, y_q12, &squares);
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
     fit_shapes_set_bell(&squares, terms->pull_k_q24[j], &bell[j]);
@@ -230,9 +236,9 @@ static NOINLINE void add_pull(struct fit_shapes_pad *pad, const struct terms *te
       for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
         f_q27 += terms->pull_q12[j] * ((bell[j].x_q15[i] * bell[j].y_q15[k]) >> 15);
       }
-      row[PULL_X] = ((f_q27 >> 15) * ((i - COLUMNS / 2) * 4096 - x_q12)) >> 9;
-      row[PULL_Y] = ((f_q27 >> 15) * ((k - ROWS / 2) * 4096 - y_q12)) >> 9;
-      row[RESIDUAL] -= row[PULL_X] * pull_x_q13 + row[PULL_Y] * pull_y_q13;
+      row[pull] = ((f_q27 >> 15) * ((i - COLUMNS / 2) * 4096 - x_q12)) >> 9;
+      row[pull + 1] = ((f_q27 >> 15) * ((k - ROWS / 2) * 4096 - y_q12)) >> 9;
+      row[RESIDUAL] -= row[pull] * pull_x_q13 + row[pull + 1] * pull_y_q13;
     }
   }
 }
@@ -246,18 +252,22 @@ void fit_shapes_round_places(struct fit_shapes_at *at) {
 void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count, const struct fit_shapes_at *where,
                          struct fit_shapes_equations *equations) {
   const int32_t *at = where->value;
-  const bool pulls = count > BALANCE && model == LONG;
+  const int pull = model == ROUND ? SPAN_X : PULL_X;
+  const bool pulls = count > pull && model != TWO;
   struct terms terms;
   struct blob blob[4];
-  fit_shapes_set_terms(pad, at[SPREAD], pulls, &terms);
+  fit_shapes_set_terms(pad, at[SPREAD], &terms);
   int blobs = set_blobs(model, at, blob);
   equations->count = count;
+  equations->pull = pulls ? pull : 0;
   set_far(pad, model, blob, at);
   for (int b = 0; b < blobs; b++) {
     add_blob(pad, &terms, model, &blob[b], at[AMPLITUDE] >> 7);
   }
   if (pulls) {
-    add_pull(pad, &terms, at);
+    int32_t line_q20 = model == LONG ? fixed_mul_16(fit_shapes_span_square(at), LINE_Q16) : 0;
+    set_pull_terms(pad, at[SPREAD] + line_q20, &terms);
+    add_pull(pad, &terms, at, pull);
   }
   uint32_t size = 0;
   int32_t *row = pad->room.row[0];

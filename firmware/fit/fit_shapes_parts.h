@@ -6,7 +6,7 @@
  *   f = sum_j moment_j V / v_j^2 d exp(-d' d / (2 v_j)),     v_j = V_j + 1.3 t
  * A model is A sum_b w_b [s(d_b) + far exp(-d_b' d_b / (2 FAR V))] + pull' f(d): blobs of weight
  * w_b by lever_b span from the middle.
- *   round  one blob
+ *   round  one blob, and what pulls it in the place of the span
  *   long   four, the nodes of Gauss's quadrature of a line from -span to span
  *   two    two, by +-span, of weight (1 +- balance) / 2
  * Forces are 2 pi V A and 2 pi V pull. */
@@ -54,7 +54,7 @@ struct squares {
 };
 
 /* fit_shapes_model.c */
-void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, bool pulls, struct terms *terms);
+void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, struct terms *terms);
 void fit_shapes_set_squares(int32_t x_q12, int32_t y_q12, struct squares *squares);
 void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell);
 /* Where a step begins is rounded, which moves the step and not where it ends. */
@@ -66,6 +66,12 @@ void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count, const
 /* Whether a spread is at its least, but for what fit_shapes_round_places makes of it. */
 static inline bool fit_shapes_is_narrowest(const struct fit_shapes_pad *pad, int32_t spread_q20) {
   return spread_q20 < pad->spread_least_q20 + 256;
+}
+
+/* Of half a line, or of half of what lies between two, Q20. */
+static inline int32_t fit_shapes_span_square(const int32_t *at) {
+  int32_t x_q10 = at[SPAN_X] >> 10, y_q10 = at[SPAN_Y] >> 10;
+  return x_q10 * x_q10 + y_q10 * y_q10;
 }
 
 /* fit_shapes_begin.c. A pair has four starts, of which two are tried in each of two parts. */

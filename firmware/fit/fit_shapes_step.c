@@ -76,11 +76,11 @@ void fit_shapes_form_residuals(struct fit_shapes_pad *pad, const int32_t *at, st
   }
   put_prior(SPREAD, base_q23 * pad->per_spread_sd_q4, pad->spread_q20 - at[SPREAD], priors);
   put_prior(FAR, base_q23 * PER_FAR_SD_Q4, -at[FAR], priors);
-  if (equations->count == UNKNOWNS) {
+  if (equations->pull) {
     int32_t per_q4 = port_divide(PER_LOAD_SD_Q4 << 16, at[AMPLITUDE] >> 4);
     int32_t element_q27 = base_q23 * (per_q4 < PER_SD_MAX_Q4 ? per_q4 : PER_SD_MAX_Q4);
-    put_prior(PULL_X, element_q27, -at[PULL_X], priors);
-    put_prior(PULL_Y, element_q27, -at[PULL_Y], priors);
+    put_prior(equations->pull, element_q27, -at[equations->pull], priors);
+    put_prior(equations->pull + 1, element_q27, -at[equations->pull + 1], priors);
   }
   uint32_t size = equations->residual_size;
   for (int u = SPREAD; u < equations->count; u++) {

@@ -19,8 +19,8 @@ TEST(each_kernel_has_its_bits) {
                                0x2D4AD7FD},
       [FIT_BITS_DOUBT] = {0x3D08903E, 0x301F042C, 0x3177F747, 0x7EA1A19F, 0x8742703B, 0xDD5D6063, 0xF0F1E3B8,
                           0x74D21670},
-      [FIT_BITS_SHAPES] = {0xD09D7A70, 0x1788F983, 0x5B46AFE6, 0x364409C2, 0x15D285CE, 0xED3F5089, 0x84FA425A,
-                           0xBAED1C79},
+      [FIT_BITS_SHAPES] = {0x39B8E7C4, 0x357535AA, 0xBF4F10A4, 0xA983E010, 0xF1111DA7, 0xE2D54482, 0x22ECF723,
+                           0x29DA0D95},
   };
   fit_bits_init();
   for (int kernel = 0; kernel < FIT_BITS_KERNELS; kernel++) {

@@ -140,7 +140,7 @@ TEST(test_a_pull_is_no_pair) {
     clear();
     pull(x, y, 6.0, qx, qy);
     held();
-    TEST_ASSERT_TRUE(result.shape == FIT_SHAPE_PULLED || result.shape == FIT_SHAPE_ELONGATED);
+    TEST_ASSERT_EQUAL(FIT_SHAPE_PULLED, result.shape);
     TEST_ASSERT_FLOAT_WITHIN(0.6f, (float)x, result.x_mm[0]);
     TEST_ASSERT_FLOAT_WITHIN(0.6f, (float)y, result.y_mm[0]);
     TEST_ASSERT_FLOAT_WITHIN(0.8f, (float)qx, result.qx_N);
@@ -236,9 +236,18 @@ TEST(test_what_a_shape_does_not_have_is_zero) {
   TEST_ASSERT_EQUAL_FLOAT(0.0f, result.length_mm);
 }
 
+/* They lack the variance of a line of 8.05 mm beyond that across. */
+TEST(test_what_is_short_or_as_wide_is_no_edge) {
+  for (int i = 0; i < 40; i++) {
+    clear();
+    line(0.0, any(-8.0, 8.0), i % 2 ? 8.5 : 10.0, any(-0.5 * PI, 0.5 * PI), 8.0);
+    TEST_ASSERT_EQUAL(FIT_SHAPE_ROUND, held());
+  }
+}
+
 TEST(test_a_short_pair_is_a_long_contact_not_one) {
-  press(3.0, 1.0, 4.0);
-  press(-3.0, 1.0, 4.0);
+  press(4.0, 1.0, 4.0);
+  press(-4.0, 1.0, 4.0);
   TEST_ASSERT_EQUAL(FIT_SHAPE_ELONGATED, held());
   TEST_ASSERT_FLOAT_WITHIN(0.05f, 1.0f, result.along_x);
 }
