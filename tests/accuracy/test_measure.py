@@ -112,7 +112,7 @@ class Frames(unittest.TestCase):
         chained, *_ = MEASURE.chain(ARRAY, MEASURE.settings(), frames)
         flags, usable, above = np.zeros(400, np.uint8), np.zeros(400, np.uint32), np.zeros((400, 15), np.int32)
         readings = np.ascontiguousarray(frames["pressure_Pa_q10"][0, :, :15])
-        MEASURE.call("gate_series", 5.0, frames["t_us"][0].copy(), readings, flags, usable, above)
+        MEASURE.call("gate_series", 5.0, frames["t_us"][0].copy(), readings, flags, usable, above, np.zeros(0, np.int32))
         np.testing.assert_array_equal(flags & 1, chained["contact"][0])
         np.testing.assert_array_equal(flags >> 1, chained["zero_doubtful"][0])
         np.testing.assert_array_equal(usable, chained["usable"][0])

@@ -9,6 +9,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "report/measure", "report/two", "python")]
+import edges  # noqa: E402
 import shapes  # noqa: E402
 from contacts import Contacts  # noqa: E402
 
@@ -21,13 +22,18 @@ FOUND = (
     ("edge_angle_p50_deg_20mm", 0, 1.5),
     ("edge_angle_p50_deg_10mm", 0, 3),
     ("silent_over_1mm_percent", 0, 2.5),
+    ("edge_on_round_percent", 0, 5),
+    ("edge_on_lime_and_finger_percent", 0, 10),
+    ("edges_found_percent", 80, 100),
+    ("angle_cover_1sd_percent_min", 30, 90),
+    ("angle_cover_1sd_percent_max", 45, 90),
 )
 
 
 class TwoShapes(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.found = shapes.figures(Contacts(BUILD), seed=3, pads=20)
+        cls.found = shapes.figures(Contacts(BUILD), seed=3, pads=20) | edges.figures(Contacts(BUILD), seed=3, pads=4)
 
     def test_figures(self):
         for key, least, most in FOUND:
@@ -44,22 +50,6 @@ class TwoShapes(unittest.TestCase):
                 self.assertEqual(row["undecided"], 0)
                 self.assertLessEqual(row["two_and_right"], row["two"])
                 self.assertLessEqual(row["silent"] + row["warned"], 100)
-
-    def test_what_is_possible(self):
-        rows = {row["case"]: row for row in self.found["touches"]}
-        self.assertNotIn("possible", rows["round"])
-        for name, row in rows.items():
-            if name.startswith("two"):
-                with self.subTest(name):
-                    rising = [
-                        row[name] for name in ("possible", "possible_model_halved", "possible_model_quartered", "possible_rubber_known")
-                    ]
-                    self.assertEqual(rising, sorted(rising))
-        near = rows["two, 8 mm, 1:1"]
-        self.assertLess(near["possible"], near["possible_rubber_known"] - 20)
-        self.assertGreater(rows["two, 20 mm, 1:1"]["possible"], 99)
-        self.assertEqual(self.found["two_possible_percent_8mm"], rows["two, 8 mm, 1:1"]["possible"])
-        self.assertEqual(self.found["two_possible_rubber_known_percent_12mm"], rows["two, 12 mm, 1:1"]["possible_rubber_known"])
 
     def test_round_touches_are_one_and_far_pairs_two(self):
         rows = {row["case"]: row for row in self.found["touches"]}

@@ -179,15 +179,15 @@ class Contacts(Measure):
         published[~found] = 0
         return published, found
 
-    def held_shapes(self, base_Pa, pads, noise_Pa, normals, published, profile):
-        """(fit_shapes_result, shapes_place), each [touch, first or last], of contacts that hold still."""
+    def held_shapes(self, readings_Pa, pads, noise_Pa, published, profile, past_sd_Pa=0.0):
+        """(fit_shapes_result, shapes_place), each [touch, first or last], of contacts [touch, frame, sensor]."""
         pad = self.made("fit_shapes_pad", 1)
         self.call("shapes_pad", self.own_array, profile, pad)
         own = self.own_of(pads)
-        readings = q10(self.readings_Pa(base_Pa, pads, noise_Pa, normals))
-        found = self.made("fit_shapes_result", len(base_Pa), 2), self.made("shapes_place", len(base_Pa), 2)
+        found = self.made("fit_shapes_result", len(readings_Pa), 2), self.made("shapes_place", len(readings_Pa), 2)
         settings = self.settings_of(pads, noise_Pa)
-        self.call("held_shapes", self.own_array, pad, settings, self.no_own if own is None else own, readings, published, *found)
+        settings["past_sd_Pa_q10"][:, :SENSORS] = q10(past_sd_Pa)
+        self.call("held_shapes", self.own_array, pad, settings, self.no_own if own is None else own, q10(readings_Pa), published, *found)
         return found
 
     def motion_flags(self, ends, t_us, readings_Pa, pads, noise_Pa, pressed, profile):

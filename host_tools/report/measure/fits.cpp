@@ -16,8 +16,8 @@ using fingertip::twin::in_parallel;
 MEASURE_RECORD(fit_array, FIELD(sensor_count), FIELD(pitch_mm), FIELD(x), FIELD(y))
 MEASURE_RECORD(fit_own, FIELD(off_x_q15), FIELD(off_y_q15), FIELD(wider_q15))
 MEASURE_RECORD(fit_settings, FIELD(iterations), FIELD(noise_Pa_q10), FIELD(prior_sigma_mm), FIELD(prior_width_mm),
-               FIELD(cut_noises), FIELD(dip_share), FIELD(dip_sd_mm), FIELD(gain_sd_q16), FIELD(model_sd_q16),
-               FIELD(location_sd_limit_mm))
+               FIELD(cut_noises), FIELD(dip_share), FIELD(dip_sd_mm), FIELD(gain_sd_q16), FIELD(past_sd_Pa_q10),
+               FIELD(model_sd_q16), FIELD(location_sd_limit_mm))
 MEASURE_RECORD(fit_result, FIELD(x_mm), FIELD(y_mm), FIELD(p0_Pa), FIELD(sigma_mm), FIELD(force_N),
                FIELD(residual_rms_Pa), FIELD(location_sd_mm), FIELD(location_noise_mm), FIELD(force_sd_N),
                FIELD(sigma_x_mm), FIELD(sigma_y_mm), FIELD(width_correlation), FIELD(used), FIELD(flags))

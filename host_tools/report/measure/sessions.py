@@ -19,7 +19,7 @@ SENSORS = 15
 FLAT_SQUARE, ROLLER, EDGE_mm = 2, 4, 0.4
 SHAPES = (
     {"cylinder6x12": (ROLLER, 6, 12)}
-    | {f"edge{mm}": (ROLLER, 2, mm) for mm in (10, 14, 20, 24, 30, 36)}
+    | {f"edge{mm}": (ROLLER, 2, mm) for mm in (10, 12, 14, 20, 24, 27, 30, 36)}
     | {"cube15": (FLAT_SQUARE, 15, 15)}
 )
 

@@ -126,7 +126,7 @@ def conditioned(firmware, t_s, pressure_Pa, noise_Pa):
     """What the firmware's condition makes of frames: contact, doubtful, usable [frame], and pressures [frame][sensor] above the zeros, 1/1024 Pa."""
     readings = q10(pressure_Pa)
     flags, usable, above = np.zeros(len(t_s), np.uint8), np.zeros(len(t_s), np.uint32), np.zeros_like(readings)
-    firmware.call("gate_series", noise_Pa, (1e6 * (1.0 + t_s)).astype(np.uint64), readings, flags, usable, above)
+    firmware.call("gate_series", noise_Pa, (1e6 * (1.0 + t_s)).astype(np.uint64), readings, flags, usable, above, np.zeros(0, np.int32))
     return flags & 1 > 0, flags & 2 > 0, usable, above
 
 

@@ -8,7 +8,6 @@ chosen with the seeds 20000 and 30000, the rules of shapes_locate were tried wit
 import dataclasses
 
 import numpy as np
-import pair_bound
 from contacts import with_tangential
 from measure import stream_of
 from sessions import SENSORS, USUAL
@@ -17,11 +16,9 @@ from presentation import percent, quantile
 LAYER_mm, SHARE = 12.0, 0.3
 TOUCHES = 20  # of each pad, in each case
 HELD_FRAMES = 40
-RIGHT = NEAR_mm, FORCE_SHARE = 1.5, 0.1  # a pair is right within these
-FALSE_TWO = 0.002  # as often may a long contact be called two
+NEAR_mm, FORCE_SHARE = 1.5, 0.1  # a pair is right within these
 BAD_mm = 1.0
-# What a judge's model is off by, of the largest reading: as the firmware states of its own, half and a quarter of it, and nothing.
-JUDGES = {"possible": 0.002, "possible_model_halved": 0.001, "possible_model_quartered": 0.0005, "possible_rubber_known": 0.0}
+LIES_rad = 0.5 * np.pi  # a roller lies along y
 UNDECIDED, ONE, PULLED, ELONGATED, TWO, NONE = range(6)  # enum fit_shape
 CALLED = {"one": ONE, "pulled": PULLED, "long": ELONGATED, "two": TWO, "none": NONE, "undecided": UNDECIDED}
 
@@ -97,7 +94,7 @@ def draw(contacts, case, random):
 
 
 def answers(contacts, case, pads, seed):
-    """For one touch of each pad at a time: contacts [pad][1 or 2], noise, and shape and location in the answers [pad][first or held]."""
+    """For one touch of each pad at a time: contacts [pad][1 or 2], and shape and location in the answers [pad][first or held]."""
     if case.exact:
         exact = contacts.perfect_pads(len(pads))
         for name in ("dip_share", "dip_sd_mm", "cast_dip_share"):
@@ -114,7 +111,13 @@ def answers(contacts, case, pads, seed):
         base_Pa = sum(contacts.base_Pa(LAYER_mm, case.objects, which, one, pads) for one in touches.T)
         estimate, _ = contacts.estimated(base_Pa, pads, noise_Pa, of_estimate.normal(contacts.tangential_frames * SENSORS), profile)
         normals = random.normal((contacts.shapes_frames + HELD_FRAMES) * SENSORS)
-        yield touches, noise_Pa, *contacts.held_shapes(base_Pa, pads, noise_Pa, normals, estimate, profile)
+        readings_Pa = contacts.readings_Pa(base_Pa, pads, noise_Pa, normals)
+        yield touches, *contacts.held_shapes(readings_Pa, pads, noise_Pa, estimate, profile)
+
+
+def angle_off_rad(answer, true_rad):
+    off_rad = np.arctan2(answer["along_y"].astype(float), answer["along_x"]) - true_rad
+    return np.abs(off_rad - np.pi * np.round(off_rad / np.pi))
 
 
 class Judged:
@@ -145,10 +148,8 @@ class Judged:
             self.off_mm = np.where(two, middle.min(axis=1), self.off_mm)
             worse = sd_mm.max(axis=1)
         self.off_sd_mm = np.where(two, worse, self.off_sd_mm)
-        # A roller lies along y.
-        true_rad = np.arctan2(y[:, 1] - y[:, 0], x[:, 1] - x[:, 0]) if pair else touches["angle_rad"][:, 0] + 0.5 * np.pi
-        off_rad = np.arctan2(answer["along_y"].astype(float), answer["along_x"]) - true_rad
-        self.angle_deg = np.degrees(np.abs(off_rad - np.pi * np.round(off_rad / np.pi)))
+        true_rad = np.arctan2(y[:, 1] - y[:, 0], x[:, 1] - x[:, 0]) if pair else touches["angle_rad"][:, 0] + LIES_rad
+        self.angle_deg = np.degrees(angle_off_rad(answer, true_rad))
         # One location for two contacts is wrong whatever its error, unless it is called long.
         mistaken = (shape == ONE) | (shape == PULLED) if pair else two
         certain = self.off_sd_mm <= location_sd_limit_mm
@@ -157,23 +158,8 @@ class Judged:
         self.is_right = two & (self.off_mm <= NEAR_mm) & (np.abs(self.force) <= FORCE_SHARE)
 
 
-def possible(contacts, case, pads, touches, noise_Pa, seed):
-    """{judge: percent}: what no judge of these pairs does better than, of each the smaller of its two limits."""
-    pair = np.concatenate([np.stack([one["x_mm"], one["y_mm"], one["force_N"]], axis=1) for one in touches.T], axis=1)
-    draws = contacts.random(seed, stream_of("bounds, " + case.name), TOUCHES * np.arange(len(pads)))
-    normals = draws.normal(pair_bound.DRAWS * pair_bound.PAIR).reshape(len(pads), pair_bound.DRAWS, pair_bound.PAIR)
-    noise_Pa, gain_sd = noise_Pa[:, None] / np.sqrt(contacts.shapes_frames), pads["gain_sd"] * (not case.exact)
-    # All judges at once.
-    rubber = pair_bound.Rubber(contacts, LAYER_mm, case.objects[0], np.tile(pads["cast_dip_share"], len(JUDGES)))
-    pair, noise_Pa, gain_sd, normals = (np.concatenate([each] * len(JUDGES)) for each in (pair, noise_Pa, gain_sd, normals))
-    model_share = np.repeat(list(JUDGES.values()), len(pads))
-    placed, discerned, _ = pair_bound.bounds(rubber, pair, noise_Pa, gain_sd, model_share, RIGHT, FALSE_TWO, normals)
-    return dict(zip(JUDGES, (100.0 * np.minimum(placed, discerned).reshape(len(JUDGES), -1).mean(axis=1)).tolist()))
-
-
 def row_of(contacts, case, pads, seed):
-    sampled = list(answers(contacts, case, pads, seed))
-    touches, _, shapes, places = (np.concatenate(each) for each in zip(*sampled))
+    touches, shapes, places = (np.concatenate(each) for each in zip(*answers(contacts, case, pads, seed)))
     first, held = (Judged(shapes[:, k], places[:, k], touches, contacts.location_sd_limit_mm) for k in (0, 1))
     of = lambda values, chosen, share: quantile(values[chosen], share)
     elongated, off_mm = held.shape == ELONGATED, held.off_mm
@@ -192,7 +178,7 @@ def row_of(contacts, case, pads, seed):
     }
     row |= {f"chi_square_{name}": of(held.chi_square[:, k], held.has_place, 0.5) for k, name in enumerate(("one", "long", "two"))}
     row |= {"two_first": percent(first.shape == TWO), "two_and_right_first": percent(first.is_right), "silent_first": percent(first.silent)}
-    return row | (possible(contacts, case, pads, *sampled[0][:2], seed) if case.apart_mm else {})
+    return row
 
 
 def figures(contacts, seed=40000, pads=200, cases=CASES):
@@ -204,7 +190,6 @@ def figures(contacts, seed=40000, pads=200, cases=CASES):
     out = {"seed": seed, "pads": pads, "touches": list(rows.values())}
     for end, name in (("8mm", "two, 8 mm, 1:1"), ("12mm", "two, 12 mm, 1:1"), ("10mm_3to1", "two, 10 mm, 3:1")):
         out[f"two_right_percent_{end}"] = worse(name, "two_and_right", min)
-        out |= {f"two_{judge}_percent_{end}": rows[name][judge] for judge in JUDGES}
     return out | {
         "edge_angle_p50_deg_20mm": rows["edge20"]["angle_p50_deg"],
         "edge_angle_p50_deg_10mm": rows["edge10"]["angle_p50_deg"],

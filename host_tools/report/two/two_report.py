@@ -11,10 +11,6 @@ def draw_pairs(axes, rows):
     for ratio, colour in (("1:1", BLUE), ("3:1", ORANGE)):
         line = [rows[f"two, {apart} mm, {ratio}"] for apart in DISTANCES_mm]
         axes.plot(DISTANCES_mm, [row["two_and_right"] for row in line], "o-", color=colour, label=f"{ratio}, two and right")
-        axes.plot(DISTANCES_mm, [row["possible"] for row in line], "--", color=colour, lw=1, label=f"{ratio}, possible, model off by 0.002")
-        axes.plot(
-            DISTANCES_mm, [row["possible_rubber_known"] for row in line], ":", color=colour, lw=1, label=f"{ratio}, possible, rubber known"
-        )
     axes.set_ylim(0, 105)
     axes.set_xlabel("distance of the two, mm", size=9)
     axes.legend(fontsize=8)

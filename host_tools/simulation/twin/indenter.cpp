@@ -40,6 +40,7 @@ std::vector<Indenter> make() {
        EDGE_mm, 0},
       flat(Shape::flat_cylinder, "bottle_cap", 28, 1.5, "bottle cap held by its top: flat disc, 28 mm"),
       {"lime", "lime: ellipsoid 45 by 55 mm, as stiff as its rind, 1 MPa", Shape::ellipsoid, 45, 55, 45, 0, 1e6},
+      {"finger", "finger: ellipsoid 16 by 20 mm of 0.15 MPa; assumed", Shape::ellipsoid, 16, 20, 16, 0, 0.15e6},
       sphere("ping_pong", 40, "ping-pong ball: rigid sphere, 40 mm"),
       sphere("rubber_duck", 30, "rubber duck held by its body: sphere 30 mm of soft vinyl, 0.5 MPa", 0.5e6),
   };
