@@ -68,8 +68,8 @@ class Taps:
         sensors = (len(self.x_mm), sessions.SENSORS)
         return self.estimates(np.ones(sensors), np.full(sensors, RAW_GAIN_SD))
 
-    def after(self, session, with_own=True):
-        return self.estimates(session.sensors["gain"], session.sensors["reading_sd"], session.found, session.own if with_own else None)
+    def after(self, session):
+        return self.estimates(session.sensors["gain"], session.sensors["reading_sd"], session.found, session.own)
 
 
 def medians(distances_mm):
@@ -101,7 +101,6 @@ class PadCase:
         after_mm, after_force, warned = taps.after(self.session)
         true_mm, *_ = taps.estimates(true_gain, np.zeros_like(true_gain))
         self.before_mm, self.after_mm, self.true_mm = medians(before_mm), medians(after_mm), medians(true_mm)
-        self.by_gains_mm = medians(taps.after(self.session, with_own=False)[0])
         self.p95_mm = [[quantile(one, 0.95) for one in each] for each in (before_mm, after_mm)]
         self.warned_percent = 100.0 * warned.mean()
         scale = self.session.found["force_scale"]
@@ -130,7 +129,6 @@ class PadCase:
             "pads": self.pads,
             "before_median_mm": middle(self.before_mm),
             "after_median_mm": middle(self.after_mm),
-            "by_gains_median_mm": middle(self.by_gains_mm),
             "true_gains_median_mm": middle(self.true_mm),
             "before_p95_mm": middle(self.p95_mm[0]),
             "after_p95_mm": middle(self.p95_mm[1]),
@@ -202,7 +200,6 @@ def figures(firmware, options):
         "cal_20_median_mm": middle(cases["gains 20 %"].after_mm),
         "cal_dip_median_mm": middle(cases["dip"].after_mm),
         "cal_real_median_mm": middle(cast.after_mm),
-        "cal_real_by_gains_median_mm": middle(cast.by_gains_mm),
         # Pads whose median error rose after a calibration that was accepted, bad sessions included. 6 mm worsens the median and mends the rest:
         # its rows show that.
         "worse_after_accept": sum(case.worse for case in on_thick) + sum(row["worse_after_accept"] for row in bad.values()),

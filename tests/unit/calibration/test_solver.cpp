@@ -146,15 +146,13 @@ TEST(Solver, one_weight_determines_a_tilt_and_a_bowl) {
   }
 }
 
-TEST(Solver, standard_deviations_are_honest) {
-  for (double misplaced_mm : {0.0, 0.1}) {
-    Honesty honesty;
-    for (std::uint64_t seed = 100; seed < 125; seed++) {
-      const KnownPad pad(seed, 0.1, misplaced_mm);
-      honesty.add(pad, solve(pad.array, good_session(pad, 25, seed)));
-    }
-    honesty.expect();
+TEST(Solver, standard_deviations_are_honest) { /* of sensors in their places: below, at no spread */
+  Honesty honesty;
+  for (std::uint64_t seed = 100; seed < 125; seed++) {
+    const KnownPad pad(seed, 0.1, 0.1);
+    honesty.add(pad, solve(pad.array, good_session(pad, 25, seed)));
   }
+  honesty.expect();
 }
 
 /* Of sensors of real pads a contact is wider or narrower by some percent. */
@@ -208,17 +206,6 @@ TEST(Solver, the_record_holds_where_each_sensor_is_and_how_wide) {
   EXPECT_EQ(made.sensors[1].off_x_um, -CALIBRATION_OFF_MAX_um);
   EXPECT_EQ(made.sensors[1].off_y_um, CALIBRATION_OFF_MAX_um);
   EXPECT_EQ(made.sensors[1].wider_q15, CALIBRATION_WIDER_MAX_Q15);
-}
-
-TEST(Solver, more_placements_determine_more) {
-  const KnownPad pad(5);
-  const auto placements = good_session(pad, 40, 5);
-  double before = 1.0;
-  for (std::size_t count : {6u, 10u, 20u, 40u}) {
-    const Solution s = solve(pad.array, {placements.begin(), placements.begin() + count});
-    EXPECT_LT(s.worst_shape_sd(), 0.8 * before) << count;
-    before = s.worst_shape_sd();
-  }
 }
 
 TEST(Solver, drops_what_is_no_such_placement) {
