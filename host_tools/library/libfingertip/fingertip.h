@@ -133,7 +133,8 @@ struct fingertip_item {
   uint32_t type;   /* of the packet; 0: an event, fingertip_reader_event has its text */
 };
 
-/* The next packet or event, with its numbers. FINGERTIP_WAIT: feed more. FINGERTIP_END: that was all. */
+/* The next packet or event, with its numbers. FINGERTIP_WAIT: feed more. FINGERTIP_END: that was all.
+ * Where no info packet precedes a fingertip's first row, one is made of the head's keys; the counts are without it. */
 enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, struct fingertip_item *item,
                                             double *values, size_t size, size_t *count);
 const char *fingertip_reader_event(const struct fingertip_reader *reader);

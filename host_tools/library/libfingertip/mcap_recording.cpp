@@ -379,7 +379,7 @@ bool McapLineSource::next(Line &line) {
           has_first_ = true;
           joint_ = line.text == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
         }
-        if (!has_header_ && !line.text.empty() && line.text[0] != '#') {
+        if (!has_header_ && !trim(line.text).empty() && line.text[0] != '#') {
           const auto columns = columns_of(line.text, joint_);
           sensor_count_ = columns ? columns->sensor_count : std::uint8_t{0};
           sets_ = columns ? columns->sets : LATER_SETS;
@@ -387,7 +387,7 @@ bool McapLineSource::next(Line &line) {
         }
       } else {
         auto row = ros::decode_row(message.data);
-        if (!row || row->time_us.has_value() != joint_ ||
+        if (!row || !has_header_ || row->time_us.has_value() != joint_ ||
             (row->raw && row->raw->body.raw.sensor_count != sensor_count_)) {
           throw mcap::Damage("a message on " + printable(message.topic) +
                              " is damaged, or of another version of this tool, which can convert "

@@ -332,8 +332,7 @@ class McapLineReader:
         self._schemas: dict[int, str] = {}  # names
         self._channels: dict[int, tuple[str, str]] = {}  # topic, name of the schema
         self._is_joint: bool | None = None
-        self._names: list[str] = []
-        self._is_torn = self._has_any = False
+        self._has_header = self._is_torn = self._has_any = False
 
     def _damaged(self, topic: str, error: ValueError) -> Damaged:
         text = f"a damaged message on {topic} ({error}), or one of another version of the tool; use --salvage to skip it"
@@ -342,6 +341,8 @@ class McapLineReader:
     def items(self) -> Iterator[Line | Contacts | Damaged]:
         """The lines in the order in which they were written, rows many at a time; what is damaged is among them, at its place."""
         for each in self._records():
+            if isinstance(each, Contacts) and not self._has_header:
+                each = self._damaged(each.topics[0], ValueError("a row with no header line before it"))
             yield each if isinstance(each, (Contacts, Damaged)) else self._of_line(each)
         if not self._has_any:
             raise InputError(f"{self.path}: no recording of a fingertip; give one that fingertip has written")
@@ -467,8 +468,7 @@ class McapLineReader:
         text = line[1].rstrip("\r")
         if self._is_joint is None:
             self._is_joint = text == "# fingertip-recording 2"
-        if not self._names and text and not text.startswith("#"):
-            self._names = text.split(",")
+        self._has_header = self._has_header or text.strip(" \t\r")[:1] not in ("", "#")
         return line
 
     def tables(self, contacts: Contacts, rows: Rows) -> "Iterator[tuple[list[int], Array, Array, Array] | Damaged]":

@@ -241,7 +241,7 @@ static void write_one(enum fingertip_format format) {
 /* What a reader that is fed in such steps finds: its last status, and how many of what. */
 struct found {
   enum fingertip_status status;
-  unsigned contacts, raws, events, of_device_1;
+  unsigned contacts, raws, infos, events, of_device_1;
   double last_us;
   bool has_end;
   double counts[FINGERTIP_COUNTS];
@@ -258,6 +258,7 @@ static struct found found_in(size_t step, int salvage) {
            FINGERTIP_OK) {
       found.contacts += item.type == CONTACT;
       found.raws += item.type == RAW;
+      found.infos += item.type == INFO && values[at(INFO, "sensor_count")] == 2;
       found.of_device_1 += item.device == 1;
       if (item.type == 0) {
         found.events++;
@@ -325,7 +326,8 @@ TEST(several_fingertips_share_a_recording_and_a_clock) {
     TEST_ASSERT_EQUAL_INT_MESSAGE(FINGERTIP_END, found.status, fingertip_error());
     TEST_ASSERT_EQUAL_UINT(20, found.contacts);
     TEST_ASSERT_EQUAL_UINT(40, found.raws);
-    TEST_ASSERT_EQUAL_UINT(20, found.of_device_1);
+    TEST_ASSERT_EQUAL_UINT(2, found.infos);            /* of the head's keys */
+    TEST_ASSERT_EQUAL_UINT(1 + 20, found.of_device_1); /* that, and its rows */
     TEST_ASSERT_TRUE(found.last_us == 19000);
     infos[count + at(INFO, "sensor_count")] = 3;
     TEST_ASSERT_NULL(fingertip_writer_new_joint((enum fingertip_format)format, infos, 2, 0, ""));
