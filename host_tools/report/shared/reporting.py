@@ -167,11 +167,11 @@ def add_parts(parser, name, parts):
     parser.add_argument("--parts", metavar="NAME,...", help=f"only these of {','.join(parts)}; the others from the folder's {name}.json")
 
 
-def report_of_parts(options, name, parts, goals, measure, pages, derive=lambda found, out: {}, usual=None):
+def report_of_parts(options, name, parts, goals, measure, pages, derive=lambda found, out: {}):
     """A report of parts that run one after the other: those of --parts, or the usual ones, or all. parts: what each does; measure[part](options) ->
     figures; derive(found, out) -> figures that follow from others; pages: the module that draws name.png, and names in PICTURED the tables that only
     the picture shows. Exit status."""
-    chosen = options.parts.split(",") if options.parts else list(parts) if usual is None else usual
+    chosen = options.parts.split(",") if options.parts else list(parts)
     if unknown := [part for part in chosen if part not in parts]:
         raise InputError(f"--parts: {unknown[0]} is none of {','.join(parts)}")
     out = output_folder(options)

@@ -1,71 +1,13 @@
-"""The tables of contacts over time: rubber that remembers, screws, the taps of the paper, and pads that end."""
+"""The tables of contacts over time: screws, the taps of the paper, and pads that end."""
 
 import math
 
 import numpy as np
-from contacts import FORCE_N, SENSORS, Scenario, stuck_N
+from contacts import FORCE_N, SENSORS, Scenario
 from presentation import percent, quantile
 from touches import LAYER_mm, TOUCHES, UNITS_PER_PAD, Judged, draw, frame_normals, judged, of_all
 
 TAP_OBJECTS, TAP_PADS = ("sphere6", "sphere15", "cylinder6", "cube6"), 8
-# What is read, and when.
-MOMENTS = (
-    ("0.6 s after the touch, no load yet", 0.9),
-    ("0.2 s after the load", 1.5),
-    ("1.7 s after the load", 3.0),
-    ("10 s after the load", 11.2),
-    ("0.2 s after the load has gone", 11.8),
-)
-RUBBER = (
-    ("none", False),
-    ("memory", False),
-    ("memory", True),
-    ("hysteresis", False),
-    ("aftereffect", False),
-    ("memory,hysteresis,aftereffect", True),
-)
-
-
-def pressed_over_time(full, t_s):
-    """[touch][time]: a press of 0.3 s; the tangential force comes after 1 s, within 0.3 s, and goes after 11.3 s."""
-    rises = lambda begin_s, end_s: np.clip((t_s - begin_s) / (end_s - begin_s), 0.0, 1.0)
-    pressed, share = rises(0.0, 0.3), rises(1.0, 1.3) - rises(11.3, 11.6)
-    now = np.repeat(full[:, None], len(t_s), axis=1)
-    now["force_N"] *= pressed
-    for name in FORCE_N:
-        now[name] *= share
-    now["stuck_N"] = stuck_N(now["force_N"], np.hypot(*(now[name] for name in FORCE_N)))
-    return now
-
-
-def settled_gains(contacts, effects, seeds):
-    """Gains as placements that are read 0.75 s after the touch find them."""
-    placed_Pa = 1e4
-    base_Pa = np.full((len(seeds), 3, SENSORS), placed_Pa)
-    base_Pa[:, 0] = 0.0
-    return placed_Pa / contacts.rubber(effects, LAYER_mm, seeds, np.array([0.0, 0.01, 0.75]), base_Pa)[:, -1]
-
-
-def rubber(bench, out):
-    """A press and a tangential force that comes and goes. Gains are equal, or as placements on rubber that remembers find them."""
-    case, contacts = bench.usual(), bench.contacts
-    random = bench.random("rubber", np.arange(max(20, bench.pads)))
-    full, which, seeds = draw(contacts, case, random), random.below(len(case.objects)), random.bits()
-    normals = [frame_normals(contacts, random) for _ in MOMENTS]
-    t_s = 0.03 * np.arange(math.ceil(MOMENTS[-1][1] / 0.03) + 1)
-    now = pressed_over_time(full, t_s)
-    base_Pa = contacts.base_Pa(LAYER_mm, case.objects, np.repeat(which, len(t_s)), now.ravel()).reshape(*now.shape, SENSORS)
-    for effects, calibrated in RUBBER:
-        reported_Pa = contacts.rubber(effects, LAYER_mm, seeds, t_s, base_Pa)
-        pads = contacts.perfect_pads(len(full))
-        if calibrated:
-            pads["gain"] = settled_gains(contacts, effects, seeds)
-        kind = effects + (", calibrated" if calibrated else "")
-        for (moment, moment_s), noise in zip(MOMENTS, normals):
-            k = np.searchsorted(t_s, moment_s)
-            estimate = contacts.estimated(reported_Pa[:, k], pads, contacts.noise_Pa(case.osr), noise, contacts.pad_profile(LAYER_mm))
-            row = Judged(now[:, k], np.zeros(len(full), int), *estimate).row(f"{kind}, {moment}")
-            out["by_rubber"].append(row | {"effects": kind, "t_s": moment_s})
 
 
 def screws(bench, out):

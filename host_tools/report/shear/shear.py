@@ -20,15 +20,13 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_tools/report/measure", "host_tools/python")]
 
 import shear_report  # noqa: E402
-from boards import fit_cycles_of  # noqa: E402
 from fingertip.files import run_tool  # noqa: E402
-from reporting import add_parts, built, contacts_of, figures_kept, given, option_parser, output_folder, positive, report_of_parts  # noqa: E402
+from reporting import add_parts, contacts_of, figures_kept, given, option_parser, output_folder, positive, report_of_parts  # noqa: E402
 
 # part: what it measures
 PARTS = {
-    "static": "one touch: size, direction, location and force by pad, tangential force, object and location; bounds; pads that end",
+    "static": "one touch: size, direction, location and force by pad, tangential force, object and location; pads that end",
     "motion": "objects that are lifted, carried and slip: sliding distinguished from loading",
-    "chip": "cycles, frames a second and latency of the images of scene grasp in the emulator",
 }
 # Of contacts after contacts, which the part over_time of truth.py plays: here, there, and its goal.
 OVER_TIME = (
@@ -72,8 +70,6 @@ GOALS = (
     ("slide_latency_p95_ms", "<=", 25),
     ("optimum_p99_um", "<=", 2),
     ("optimum_p99_ratio", "<=", 0.001),
-    ("chip_fps_osr256", ">=", 1250),
-    ("shear_cycles", "<=", 40_000),
     *((name, *goal) for name, _, *goal in OVER_TIME),
 )
 # Of the estimate against an independent one in double precision: the test that compares them leaves them in the file that it is given.
@@ -93,14 +89,7 @@ def measure_motion(options):
     return motion.figures(contacts_of(options), **given(options, "seed"), cases=motion.CASES[: 1 if options.few else None])
 
 
-def measure_chip(options):
-    import chip
-
-    built(fit_cycles_of(options.boards))
-    return chip.measure(options.build, options.boards, lambda what: print(f"        {what}", flush=True))
-
-
-MEASURE = {"static": measure_static, "motion": measure_motion, "chip": measure_chip}
+MEASURE = {"static": measure_static, "motion": measure_motion}
 
 
 def derived(found, out):
@@ -112,7 +101,7 @@ def derived(found, out):
 
 
 def main(argv):
-    parser = option_parser(__doc__, boards=True)
+    parser = option_parser(__doc__)
     parser.add_argument("--seed", type=int, metavar="N")
     parser.add_argument("--pads", type=positive, metavar="N", help="of each case of one touch; default 1500")
     parser.add_argument(
@@ -120,12 +109,9 @@ def main(argv):
     )
     add_parts(parser, "shear", PARTS)
     options = parser.parse_args(argv)
-    usual = [part for part in PARTS if part != "chip" or fit_cycles_of(options.boards).is_file()]
-    if not options.parts and len(usual) < len(PARTS):
-        print("        not built, so not measured: chip", flush=True)
     if not options.parts and (test := pathlib.Path(options.build) / OPTIMUM_TEST).is_file():
         subprocess.run([str(test), str(output_folder(options) / OPTIMUM_FILE)], stdout=subprocess.DEVNULL)
-    return report_of_parts(options, "shear", PARTS, GOALS, MEASURE, shear_report, derived, usual)
+    return report_of_parts(options, "shear", PARTS, GOALS, MEASURE, shear_report, derived)
 
 
 if __name__ == "__main__":

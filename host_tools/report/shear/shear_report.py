@@ -56,23 +56,6 @@ def draw_location(axes, rows):
     tidy(axes, "Location before and after (calibrated pads)", "% of touches below", grid="both")
 
 
-def draw_bounds(axes, found):
-    rows = [(row["case"].replace("; priors", ""), row["vector_error_p50"], FAINT) for row in found["bounds"] if ";" in row["case"]]
-    rows += [
-        (f"found: {row['pad']}", row["vector_error_p50"], BLUE)
-        for row in found["by_pad_and_load"]
-        if row["load"] == 0.3 and "risen" not in row["case"]
-    ]
-    places = range(len(rows))
-    axes.barh(places, [value for _, value, _ in rows], color=[colour for *_, colour in rows])
-    axes.set_yticks(places, [name for name, *_ in rows], size=7)
-    axes.set_xscale("log")
-    axes.invert_yaxis()
-    axes.axvline(0.02, color=GOAL, lw=1, ls="--")
-    axes.set_xlabel("median error of Q/F, at 0.3 (dashed: goal)", size=9)
-    tidy(axes, "Cramer-Rao bounds with the priors (grey)\nand what was found", grid="x")
-
-
 def draw_objects(axes, rows):
     rows = sorted((row for row in rows if row["load"] == 0.3), key=lambda row: (row["vector_error_p50"] is None, row["vector_error_p50"]))
     places = range(len(rows))
@@ -113,7 +96,6 @@ def draw(found, path):
         ("map", lambda axes: draw_map(axes, found["map"])),
         ("arrows", lambda axes: draw_arrows(axes, found["arrows"])),
         ("location_quantiles", lambda axes: draw_location(axes, found["location_quantiles"])),
-        ("bounds", lambda axes: draw_bounds(axes, found)),
         ("by_object", lambda axes: draw_objects(axes, found["by_object"])),
         ("by_overhang", lambda axes: draw_overhang(axes, found["by_overhang"])),
     )

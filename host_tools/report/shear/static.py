@@ -6,7 +6,6 @@ figures() returns the figures that are judged, and the tables and samples behind
 import collections
 import sys
 
-import bounds
 import moving
 import numpy as np
 from contacts import FORCE_N, FRICTION, SENSORS, with_tangential
@@ -17,11 +16,7 @@ from touches import (
     LAYER_mm,
     SEVEN,
     SHARE,
-    TOUCHES,
-    UNITS_PER_PAD,
     Case,
-    Judged,
-    draw,
     frame_normals,
     judged,
     of_all,
@@ -264,27 +259,6 @@ def cast(bench, out):
                 out[prefix + "location_price_mm"] = row["location_p50_mm"] - row["location_without_p50_mm"]
 
 
-def cramer_rao(bench, out):
-    """What errors of these covariances would be found as."""
-    case, count, contacts = bench.usual(), min(4000, bench.pads * UNITS_PER_PAD * TOUCHES), bench.contacts
-    random = bench.random("bounds", np.arange(count))
-    touch, normals = draw(contacts, case, random), random.normal(4)
-    gain_sd = case.pads["gain_sd"][np.arange(count) % len(case.pads)]
-    for name, known, has_gains, model_share in bounds.LIMITS:
-        errors = contacts.noise_Pa(case.osr), gain_sd * has_gains, model_share
-        ratio, location_mm = (
-            np.einsum("nij,nj->ni", np.linalg.cholesky(each), normals[:, k : k + 2])
-            for k, each in zip((0, 2), bounds.bounds(contacts, LAYER_mm, touch, *errors, known))
-        )
-        estimate = contacts.made("published", count)
-        estimate["valid"] = True
-        for k, axis in enumerate("xy"):
-            estimate[f"q{axis}"] = touch[FORCE_N[k]] / touch["force_N"] + ratio[:, k]
-            estimate[f"{axis}_mm"] = touch[f"{axis}_mm"] + location_mm[:, k]
-        row = Judged(touch, np.zeros(count, int), estimate, estimate["valid"]).row(name)
-        out["bounds"].append({key: row[key] for key in ("case", "touches", *ERRORS, "location_p50_mm", "location_p95_mm")})
-
-
 def arrows(bench, out):
     """Fifteen touches to draw."""
     force_N, random, contacts = 5.0, bench.random("arrows"), bench.contacts
@@ -313,8 +287,6 @@ TABLES = {
     "thickness": thickness,
     "learned": learned,
     "cast": cast,
-    "bounds": cramer_rao,
-    "rubber": moving.rubber,
     "screws": moving.screws,
     "taps": moving.taps,
     "overhang": moving.overhang,
