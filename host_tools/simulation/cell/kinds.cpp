@@ -22,67 +22,37 @@ struct Ranges {
   double strength; // of events
 };
 
-// In the order of Kind. side: the two sides' friction differs by this share. com_share: how far the centre of mass is
-// off, as a share of half of the size; half of the objects have none.
-constexpr Ranges RANGES[] = {
-    {{0.05, 0.6}, {0.4, 1.0}, {0.9, 1.0}, {0.0, 0.05}, {0, 1}, {0, 0}, {0.2, 0.6}, {0, 0}, 2e-4, 0, 0, 0, 0, 0},
-    {{0.05, 1.0},
-     {0.3, 1.0},
-     {0.75, 1.0},
-     {0.0, 0.15},
-     {0, 2},
-     {0, 0.2},
-     {0.2, 1.2},
-     {0, 0.015},
-     1e-3,
-     0.02,
-     0.03,
-     1,
-     2,
-     0.7},
-    {{0.05, 1.0},
-     {0.25, 0.9},
-     {0.714, 1.0},
-     {0.0, 0.3},
-     {0, 3},
-     {0, 0.3},
-     {0.5, 2.0},
-     {0.01, 0.04},
-     3e-3,
-     0.05,
-     0.08,
-     2,
-     3,
-     1.0},
-    {{0.05, 1.0},
-     {0.35, 1.0},
-     {0.75, 1.0},
-     {0.0, 0.15},
-     {0, 2},
-     {0, 0.2},
-     {0.2, 1.2},
-     {0, 0.015},
-     1e-3,
-     0.02,
-     0,
-     1,
-     1,
-     1.0},
-    {{0.0, 0.0},
-     {0.35, 0.9},
-     {0.75, 1.0},
-     {0.0, 0.15},
-     {0, 3},
-     {0, 0.1},
-     {0.2, 0.8},
-     {0, 0.015},
-     1e-3,
-     0.02,
-     0,
-     0,
-     1,
-     0.4},
+// A row for each quantity, in it the kinds in their order. side: the two sides' friction differs by this share.
+// com_share: how far the centre of mass is off, as a share of half of the size; half of the objects have none.
+struct Rows {
+  Range mass_kg[5], friction[5], kinetic_share[5], side[5], off_mm[5], com_share[5], lift_m_s2[5], delay_s[5];
+  double jitter_s[5], lost_share[5], gone_share[5];
+  std::uint64_t events_least[5], events_most[5];
+  double strength[5];
 };
+constexpr Rows ALL = {
+    {{0.05, 0.6}, {0.05, 1.0}, {0.05, 1.0}, {0.05, 1.0}, {0.0, 0.0}},
+    {{0.4, 1.0}, {0.3, 1.0}, {0.25, 0.9}, {0.35, 1.0}, {0.35, 0.9}},
+    {{0.9, 1.0}, {0.75, 1.0}, {0.714, 1.0}, {0.75, 1.0}, {0.75, 1.0}},
+    {{0.0, 0.05}, {0.0, 0.15}, {0.0, 0.3}, {0.0, 0.15}, {0.0, 0.15}},
+    {{0, 1}, {0, 2}, {0, 3}, {0, 2}, {0, 3}},
+    {{0, 0}, {0, 0.2}, {0, 0.3}, {0, 0.2}, {0, 0.1}},
+    {{0.2, 0.6}, {0.2, 1.2}, {0.5, 2.0}, {0.2, 1.2}, {0.2, 0.8}},
+    {{0, 0}, {0, 0.015}, {0.01, 0.04}, {0, 0.015}, {0, 0.015}},
+    {2e-4, 1e-3, 3e-3, 1e-3, 1e-3},
+    {0, 0.02, 0.05, 0.02, 0.02},
+    {0, 0.03, 0.08, 0, 0},
+    {0, 1, 2, 1, 0},
+    {0, 2, 3, 1, 1},
+    {0, 0.7, 1.0, 1.0, 0.4},
+};
+
+Ranges ranges_of(Kind kind) {
+  const auto k = static_cast<std::size_t>(kind);
+  return {ALL.mass_kg[k],    ALL.friction[k],     ALL.kinetic_share[k], ALL.side[k],     ALL.off_mm[k],
+          ALL.com_share[k],  ALL.lift_m_s2[k],    ALL.delay_s[k],       ALL.jitter_s[k], ALL.lost_share[k],
+          ALL.gone_share[k], ALL.events_least[k], ALL.events_most[k],   ALL.strength[k]};
+}
 
 struct Fragile {
   const char *name;
@@ -172,7 +142,7 @@ void draw_shape(Random &random, const Ranges &ranges, KindOfGrasp &grasp) {
 }
 
 KindOfGrasp draw_once(Random &random, Kind kind) {
-  const Ranges &ranges = RANGES[static_cast<int>(kind)];
+  const Ranges ranges = ranges_of(kind);
   KindOfGrasp grasp{};
   grasp.kind = kind;
   grasp.mass_kg = ranges.mass_kg.low > 0.0 ? random.log_uniform(ranges.mass_kg.low, ranges.mass_kg.high) : 0.0;
