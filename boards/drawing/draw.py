@@ -6,6 +6,7 @@ draw.py --check    lists those that differ from what would be written
 
 boards/<board>/wiring.svg                  from board.json
 boards/<board>/README.md, wiring and parts from board.json and parts.json
+boards/<board>/pcb/, picture, BOM, placement from the .kicad_pcb there and parts.json
 boards/placement.svg, boards/mould.svg     at 1:1, from firmware/config/geometry.c
 boards/BUILD.md, measures                  the same as a table
 """
@@ -17,10 +18,11 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
-import geometry  # noqa: E402
-import mould  # noqa: E402
-import placement  # noqa: E402
-import wiring  # noqa: E402
+import geometry
+import mould
+import pcb
+import placement
+import wiring
 
 COMMAND = "boards/drawing/draw.py"
 
@@ -30,7 +32,7 @@ def filled(page, name, text, command=COMMAND):
     begin, end = f"<!-- {name}: python3 {command} -->", f"<!-- /{name} -->"
     if page.count(begin) != 1 or page.count(end) != 1:
         raise wiring.Unwired(f'a page has no place for "{name}": it needs one line {begin} and one line {end}')
-    return re.sub(f"{re.escape(begin)}.*?{re.escape(end)}", lambda _: f"{begin}\n\n{text}\n{end}", page, flags=re.S)
+    return re.sub(f"{re.escape(begin)}.*?{re.escape(end)}", lambda _: f"{begin}\n\n{text}\n{end}", page, flags=re.DOTALL)
 
 
 def yageo(ohm):
@@ -40,12 +42,18 @@ def yageo(ohm):
     return f"{whole}{letter}{rest}"
 
 
+def part_of(parts, key):
+    """Its row of parts.json; a number is a resistance in ohms."""
+    if not isinstance(key, (int, float)):
+        return parts[key]
+    part = parts["resistor"]
+    return part | {"part": part["part"].format(wiring.ohms(key)), "order": part["order"].format(yageo(key))}
+
+
 def parts_table(board, parts):
     rows = ["| count | part | maker, order number | number seen in |", "|---|---|---|---|"]
     for count, key, what in wiring.parts(board):
-        part = dict(parts["resistor" if isinstance(key, (int, float)) else key])
-        if isinstance(key, (int, float)):
-            part["part"], part["order"] = part["part"].format(wiring.ohms(key)), part["order"].format(yageo(key))
+        part = part_of(parts, key)
         rows.append(f"| {count} | {part['part']}{': ' + what if what else ''} | {part['maker']} {part['order']} | {part['checked']} |")
     return "\n".join(rows) + "\n"
 
@@ -61,6 +69,8 @@ def drawings(root):
         page = path.parent / "README.md"
         text = filled(page.read_text(encoding="utf-8"), "wiring", wiring.table(board))
         found[page] = filled(text, "parts", parts_table(board, parts))
+    for path in sorted(boards.glob("*/pcb/*.kicad_pcb")):
+        found |= pcb.files(path, parts, part_of)
     sensors = geometry.places(root)
     found[boards / "placement.svg"] = placement.drawn(sensors)
     found[boards / "mould.svg"] = mould.drawn(sensors)

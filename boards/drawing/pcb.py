@@ -1,0 +1,53 @@
+"""What follows from a circuit board's KiCad file: its picture, the list of parts to order, and the placement file. For draw.py."""
+
+import json
+
+import pcb_check
+import sheet
+
+ORDERED = {"U": "sensor", "C": "capacitor", "A": "pico"}  # key of parts.json by a name's first letter; R has its ohms
+
+
+def bom(board, listed, part_of):
+    found = {}
+    for name, (*_, value) in board.parts.items():
+        key = pcb_check.ohms(value) if name[0] == "R" else ORDERED.get(name[0])
+        if key is not None:
+            row = json.dumps([value, *(part_of(listed, key)[word] for word in ("maker", "order"))], separators=(",", ":"))[1:-1]
+            found.setdefault(row, []).append(name)
+    return "\n".join(["Comment,Maker,Order number,Designator", *(f'{row},"{",".join(names)}"' for row, names in found.items())]) + "\n"
+
+
+def placement(board):
+    """From the board's middle, y up; turned counter-clockwise, seen from the part's side."""
+    rows = [
+        f"{name},{sheet.number(x)}mm,{sheet.number(-y)}mm,{'Bottom' if back else 'Top'},{(-turn if back else turn) % 360}"
+        for name, (x, y, turn, back, _) in board.parts.items()
+        if name[0] in "UCRA"
+    ]
+    return "\n".join(["Designator,Mid X,Mid Y,Layer,Rotation", *rows]) + "\n"
+
+
+def drawn(board, name):
+    """Both sides at 1:1, the back as one sees it: the assembly drawing."""
+    (left, top), (right, bottom) = board.outline
+    lines = []
+    for back, words in ((False, "front: sensors"), (True, "back")):
+        middle, side, layer = (right - left + 12) * back, -1 if back else 1, "FB"[back] + ".Cu"
+        lines += [sheet.rectangle(middle, 0, right - left, bottom - top), sheet.text(middle + left, top - 2, words)]
+        lines += [sheet.circle(middle + side * x, y, diameter) for x, y, diameter in board.holes]
+        for x0, y0, x1, y1, width, _ in (track for track in board.tracks if track[-1] == layer):
+            way = f"M{sheet.number(middle + side * x0)} {sheet.number(y0)}L{sheet.number(middle + side * x1)} {sheet.number(y1)}"
+            lines.append(f'  <path class="measure" style="stroke-width: {width:g}; opacity: 0.5" d="{way}"/>')
+        shown = {part: place for part, place in board.parts.items() if place[3] == back}
+        lines += [sheet.rectangle(middle + side * x, y, w, h, "cut") for (part, _), (x, y, w, h, _) in board.pads.items() if part in shown]
+        lines += [sheet.text(middle + side * x, y + 0.8, part, anchor="middle") for part, (x, y, *_) in shown.items()]
+    lines += sheet.ruler(left, bottom + 8)
+    return sheet.sheet(f"Circuit board of {name}, both sides, 1:1", left - 4, top - 8, 2 * (right - left) + 20, bottom - top + 22, lines)
+
+
+def files(path, listed, part_of):
+    """{path: text}. path: the .kicad_pcb."""
+    board = pcb_check.Board(path.read_text(encoding="utf-8"))
+    texts = {"-bom.csv": bom(board, listed, part_of), "-placement.csv": placement(board), ".svg": drawn(board, path.parents[1].name)}
+    return {path.with_name(path.stem + ending): text for ending, text in texts.items()}

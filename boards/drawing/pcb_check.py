@@ -1,0 +1,176 @@
+"""Whether a circuit board is what its descriptor says: nets of all pads, values, places, holes. Reads the KiCad file as text.
+
+pcb_check.py     prints what is wrong with boards/<board>/pcb, one line each
+
+That the copper connects what the nets say, and nothing else, is for KiCad's design rule check (checks.pcb, where KiCad is installed).
+"""
+
+import collections
+import json
+import math
+import pathlib
+import re
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+import geometry  # noqa: E402
+import mould  # noqa: E402
+import pico  # noqa: E402
+
+VIA_FREE_mm = 1.95  # around a sensor's middle, each way
+NEAR_mm = 4  # a capacitor to its part, from pad to pad
+PADS_mm = {"1": (-1, -1), "2": (-1, 1), "3": (1, 1), "4": (1, -1)}  # of a sensor, from its middle; y down
+
+
+def parsed(text):
+    """A list of lists of words."""
+    stack = [[]]
+    for word in re.findall(r'"[^"]*"|[()]|[^\s()]+', text):
+        if word == "(":
+            stack.append([])
+        elif word == ")":
+            done = stack.pop()
+            stack[-1].append(done)
+        else:
+            stack[-1].append(word.strip('"'))
+    return stack[0][0]
+
+
+def all_of(node, name):
+    return [child for child in node if isinstance(child, list) and child[0] == name]
+
+
+def numbers(node, name):
+    return [float(word) for word in all_of(node, name)[0][1:] if re.fullmatch(r"-?[\d.]+", word)]
+
+
+class Board:
+    """Millimetres from the board's middle, x to the right and y down, seen from the front.
+
+    pads: {(part, pad): (x, y, width, height, net or None)}; parts: {name: (x, y, turn in degrees, whether on the back, value)};
+    tracks: [(x0, y0, x1, y1, width, layer)]; vias: [(x, y)]; holes: [(x, y, diameter)]; outline: two corners.
+    """
+
+    def __init__(self, text):
+        tree = parsed(text)
+        self.middle = numbers(all_of(tree, "setup")[0], "aux_axis_origin")
+        self.pads, self.parts, self.holes = {}, {}, []
+        for part in all_of(tree, "footprint"):
+            self.read_part(part)
+        of = self.from_middle
+        self.tracks = [
+            (*of(numbers(track, "start")), *of(numbers(track, "end")), numbers(track, "width")[0], all_of(track, "layer")[0][1])
+            for track in all_of(tree, "segment")
+        ]
+        self.vias = [of(numbers(via, "at")) for via in all_of(tree, "via")]
+        ((self.outline),) = [(of(numbers(line, "start")), of(numbers(line, "end"))) for line in all_of(tree, "gr_rect")]
+
+    def from_middle(self, place):
+        return place[0] - self.middle[0], place[1] - self.middle[1]
+
+    def read_part(self, part):
+        x, y, *turn = numbers(part, "at")
+        (x, y), turns = self.from_middle((x, y)), int(turn[0]) // 90 if turn else 0
+        texts = {text[1]: text[2] for text in all_of(part, "fp_text")}
+        name = texts["reference"]
+        self.parts[name] = (x, y, 90 * turns, all_of(part, "layer")[0][1] == "B.Cu", texts.get("value"))
+        for pad in all_of(part, "pad"):
+            dx, dy = numbers(pad, "at")[:2]
+            w, h = numbers(pad, "size")
+            for _ in range(turns):
+                dx, dy, w, h = dy, -dx, h, w
+            if pad[2] == "np_thru_hole":
+                self.holes.append((x + dx, y + dy, w))
+            else:
+                net = all_of(pad, "net")
+                self.pads[name, pad[1]] = (x + dx, y + dy, w, h, net[0][2] if net else None)
+
+
+def expected(descriptor):
+    """{net: set of pads} of a parallel board, without resistors and capacitors, whose names are free; and what pulls which net up, in ohms."""
+    w, ohm, count = descriptor["wiring"], descriptor["pull_ups_ohm"], descriptor["wiring"]["sensor_count"]
+    of_pico = lambda name: ("A0", str(pico.pin(name)))
+    nets = {
+        "GND": {(f"U{k}", "1") for k in range(count)} | {("A0", str(n)) for n in pico.grounds()} | {of_pico("AGND")},
+        "3V3": {(f"U{k}", "2") for k in range(count)} | {of_pico("3V3")},
+        "SCL": {(f"U{k}", "3") for k in range(count)} | {of_pico(f"GP{w['pin_scl']}")},
+    } | {f"SDA{k}": {(f"U{k}", "4"), of_pico(f"GP{k}")} for k in range(count)}
+    if "pin_sync" in w:
+        nets["SYNC"] = {of_pico(f"GP{w['pin_sync']}"), ("J0", "1")}
+    return nets, {"SCL": ohm["scl"]} | {f"SDA{k}": ohm["sda"] for k in range(count)}
+
+
+def ohms(text):
+    value, unit = text.split()
+    return float(value) * (1000 if unit == "kOhm" else 1)
+
+
+def wrong_nets(descriptor, board):
+    nets, pulls = expected(descriptor)
+    found, errors = collections.defaultdict(set), []
+    for pad, (*_, net) in board.pads.items():
+        found[net].add(pad)
+    for net in nets.keys() | found.keys() - {None}:
+        own = {pad for pad in found[net] if pad[0][0] not in "RC"}
+        if own != nets.get(net, set()):
+            errors.append(f"{net} has pads too many or too few: {sorted(own ^ nets.get(net, set()))[:4]}")
+    pulled, held = collections.defaultdict(list), set()
+    for name, (*_, value) in board.parts.items():
+        ends = [board.pads[name, pad][-1] for pad in "12"] if name[0] in "RC" else []
+        if name[0] == "R":
+            pulled[ends[0]].append(ohms(value) if ends[1] == "3V3" else ends[1])
+        elif name[0] == "C":
+            if ends != ["3V3", "GND"] or value != "100 nF":
+                errors.append(f"{name} of {value} is between {ends}")
+            own = board.pads[name, "1"]
+            held |= {pad[0] for pad in found["3V3"] if math.dist(board.pads[pad][:2], own[:2]) < NEAR_mm}
+    errors += [
+        f"{net} is pulled up by {pulled[net]}, not {pulls.get(net)} ohms"
+        for net in pulls.keys() | pulled.keys()
+        if pulled[net] != [pulls.get(net)]
+    ]
+    return errors + [
+        f"{part} has no capacitor within {NEAR_mm} mm of its supply" for part in board.parts if part[0] == "U" and part not in held
+    ]
+
+
+def wrong_places(board, sensors):
+    errors, measures = [], mould.measures(sensors)
+    for k, (x, y) in enumerate(sensors):
+        for pad, (dx, dy) in PADS_mm.items():
+            off = math.dist(board.pads.get((f"U{k}", pad), (math.inf, math.inf))[:2], (x + dx, -y + dy))
+            if off > 0.001:
+                errors.append(f"pad {pad} of sensor {k} is {off:.3f} mm off")
+        errors += [f"a via under sensor {k}" for vx, vy in board.vias if max(abs(vx - x), abs(vy + y)) < VIA_FREE_mm]
+    if sorted(board.holes) != sorted((x, -y, mould.SCREW_mm) for x, y in measures.screws):
+        errors.append("the holes are not the base plate's")
+    half = [mm / 2 for mm in measures.outside]
+    if board.outline != ((-half[0], -half[1]), (half[0], half[1])):
+        errors.append(f"the outline is {board.outline}, not the base plate's")
+    tracks = [tuple(sorted((track[:2], track[2:4]))) + track[4:] for track in board.tracks]
+    return errors + [f"two tracks lie on each other at {track[0]}" for track in sorted(set(tracks)) if tracks.count(track) > 1]
+
+
+def wrong(text, descriptor, sensors):
+    """What is wrong, a line each."""
+    board = Board(text)
+    return wrong_nets(descriptor, board) + wrong_places(board, sensors)
+
+
+def main(root=HERE.parents[1]):
+    lines = [
+        f"{path.parents[1].name}: {line}"
+        for path in sorted(root.glob("boards/*/pcb/*.kicad_pcb"))
+        for line in wrong(
+            path.read_text(encoding="utf-8"),
+            json.loads((path.parents[1] / "board.json").read_text(encoding="utf-8")),
+            geometry.places(root),
+        )
+    ]
+    print("\n".join(lines) or "the circuit boards are what their descriptors say")
+    return 1 if lines else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
