@@ -23,6 +23,7 @@ import validation  # noqa: E402
 from presentation import goal_table_md, judge  # noqa: E402
 
 GOALS = {report.__name__: report.GOALS for report in (fit, rate, validation, truth, shear, grasp)}
+LIMITS = {"<=": 1000, ">=": -1000, "within": (-1000, 1000)}
 VOID = {"meta", "img", "br", "hr"}
 PARTS = {part.name: part for part in parts.PARTS if part.page}
 
@@ -138,7 +139,7 @@ class Page(unittest.TestCase):
                 ],
             }
             found |= {limit: 0.125 for _, _, limit in goals if isinstance(limit, str)}
-            judged = judge(found, [(figure, sign, 1000 if sign == "<=" else -1000) for figure, sign, _ in goals]) if goals else found
+            judged = judge(found, [(figure, sign, LIMITS[sign]) for figure, sign, _ in goals]) if goals else found
             self.write(name, judged)
             every[name] = judged
             for picture, caption in part.page.pictures:
