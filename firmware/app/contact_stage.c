@@ -18,6 +18,7 @@ void contact_stage_gather(struct findings *found, bool calibrated) {
       .sensor_doubtful = is_sensor_doubtful(found),
       .masked = conditioned->usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
       .calibrated = calibrated,
+      .unsettled = frame->unsettled,
       .saturated = frame->saturated,
       .fit = conditioned->contact ? &found->fit : NULL,
   };

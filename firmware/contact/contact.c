@@ -53,7 +53,7 @@ void contact_judge(const struct contact_input *input, struct contact_result *res
   result->flags = flags;
 }
 
-/* A location that other sensors show may be another. One is passed over, a second one begins the history again. */
+/* A location that other settled sensors show may be another. One is passed over, a second begins the history again. */
 static bool is_passed_over(struct slip_history *history, uint32_t used) {
   const bool stays = used == history->newest;
   history->newest = used;
@@ -73,7 +73,7 @@ void contact_update(struct slip_history *history, const struct contact_settings 
   uint32_t flags = result->flags;
   if (!input->fit || !shows_motion(input, flags)) {
     slip_reset(history);
-  } else if (!is_passed_over(history, input->fit->used) &&
+  } else if (!is_passed_over(history, input->fit->used & ~input->unsettled) &&
              slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm, settings->slip_window_us,
                          &result->slip_mm)) {
     flags |= CONTACT_FLAG_SLIP_VALID;

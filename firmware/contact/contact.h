@@ -25,6 +25,7 @@ struct contact_input {
   bool zero_doubtful;                      /* see condition.h */
   bool sensor_doubtful;                    /* a sensor in use is doubtful, see frame.h */
   bool calibrated;                         /* gains and force scale of a calibration act */
+  uint32_t unsettled;                      /* bitmap, see frame.h */
   uint32_t saturated;                      /* bitmap: left out of the fit for being beyond their range */
   const struct fit_result *fit;            /* NULL where nothing was fitted */
   const struct fit_tangential *tangential; /* NULL where nothing was estimated */
@@ -39,8 +40,7 @@ struct contact_force {
   float force_N, force_sd_N; /* 0 unless FIT_VALID, and UNCERTAINTY_VALID */
 };
 
-/* With fewer unsaturated sensors than this the peak is extrapolated, and the force a lower bound.
- */
+/* With fewer unsaturated sensors the peak is extrapolated, and the force a lower bound. */
 #define CONTACT_MIN_UNSATURATED 5
 
 bool contact_is_lower_bound(const struct fit_result *fit, uint32_t saturated);

@@ -25,7 +25,7 @@ struct slip_history {
   uint16_t oldest, count; /* ring */
   bool spans;             /* the window has been filled since the last reset or pause */
   int32_t x_sum, y_sum;   /* over the ring */
-  uint32_t used, newest;  /* bitmaps: sensors of the locations, and of the newest frame; contact.c */
+  uint32_t used, newest;  /* bitmaps: settled sensors of the locations, and of the newest frame; contact.c */
 };
 
 /* Forgets the past: call when contact is lost or the location cannot be trusted. */

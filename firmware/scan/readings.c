@@ -25,8 +25,7 @@ static uint32_t size_of(int32_t value) { return (uint32_t)(value ^ -(value < 0))
 
 static int32_t difference(int32_t a, int32_t b) { return (int32_t)((uint32_t)a - (uint32_t)b); }
 
-/* The sensor whose reading has stepped while all others of these did not move, as a bitmap; and all that have fallen.
- */
+/* The sensor whose reading has stepped while all others of these did not move; all that have fallen. Bitmaps. */
 static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const int32_t last_Pa_q10[], uint32_t *fallen) {
   uint32_t stepped = 0;
   uint32_t largest = 0;
@@ -108,7 +107,7 @@ static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *rea
   }
   readings->suspects |= low & readings->was_low;
   readings->was_low = low | (readings->was_low & ~usable);
-  const uint32_t left_out = low | alone | (readings->jolted & usable);
+  const uint32_t left_out = low | alone;
   keep(readings, usable, left_out, last_Pa_q10, kept_Pa_q10);
   return left_out;
 }
@@ -137,7 +136,7 @@ static struct glance compensate(const struct readings *readings, const uint32_t 
 }
 
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good, struct frame *frame) {
-  const uint32_t usable = good & readings->has_thermal & ~(readings->suspects | readings->jolted);
+  const uint32_t usable = good & readings->has_thermal & ~(readings->suspects | (readings->jolted & readings->zero));
   const int32_t *last_Pa_q10 = readings->last_Pa_q10[readings->newest];
   readings->newest ^= 1;
   int32_t *kept_Pa_q10 = readings->last_Pa_q10[readings->newest];
@@ -163,8 +162,8 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], u
   }
   frame->valid = valid;
   frame->saturated &= valid;
-  frame->doubtful = valid & readings->doubtful;
-  frame->unsettled = valid & readings->doubted;
+  frame->doubtful = valid & (readings->doubtful | readings->jolted);
+  frame->unsettled = valid & (readings->doubted | readings->jolted);
   frame->renewed = readings->renewed;
   readings->renewed = 0;
   frame->restored = readings->restored;

@@ -1,35 +1,33 @@
-/* From codes to readings, and which of them to believe. Main context; no bus, and no time but the
- * frame's.
+/* From codes to readings, and which of them to believe. Main context; no bus, and no time but the frame's.
  *
- * Temperatures. A temperature may differ by more than READINGS_TEMPERATURE_STEP_MAX_cC from the
- * sensor's last. That is no change of temperature. The last one stays in use, and the sensor is
- * doubtful: each degree is worth some 240 Pa. Two of them that agree with each other come from a
- * sensor that has lost its state as its supply failed. It becomes a suspect. The first
- * temperature of a sensor must be near the others', too. If the sensor reports the same twice
- * before a reset and after each of two, it is believed and stays doubtful. (After one reset it may
- * have lost its state again: supplies that dip once do so twice.)
+ * Temperatures. A temperature may differ by more than READINGS_TEMPERATURE_STEP_MAX_cC from the sensor's last. That is
+ * no change of temperature. The last one stays in use, and the sensor is doubtful: each degree is worth some 240 Pa.
+ * Two of them that agree with each other come from a sensor that has lost its state as its supply failed. It becomes a
+ * suspect. The first temperature of a sensor must be near the others', too. If the sensor reports the same twice before
+ * a reset and after each of two, it is believed and stays doubtful. (After one reset it may have lost its state again:
+ * supplies that dip once do so twice.)
  *
- * Pressures. A pressure below zero is left out. A second in a row makes the sensor a suspect. A
- * large step of one sensor alone is left out as well, since rubber lets its neighbours feel any
- * press. If the next reading is back, that was all. If it stays, still alone, the sensor is a
- * suspect. Steps beside which others move count at once. So does every step while a sensor is
- * missing, since that one may feel it.
+ * Pressures. A pressure below zero is left out. A second in a row makes the sensor a suspect. A large step of one
+ * sensor alone is left out as well, since rubber lets its neighbours feel any press. If the next reading is back, that
+ * was all. If it stays, still alone, the sensor is a suspect. Steps beside which others move count at once. So does
+ * every step while a sensor is missing, since that one may feel it.
  *
  * A sensor whose supply dips may lose its state, and go on with codes that are off. Then it reads 0 once where its
- * conversion was lost, or its pressure falls, and its temperature steps. So one that reads 0, or whose pressure falls
- * at once with others', is left out until its next temperature, which is asked for at once. If that has stepped from
- * the sensor's own last it has lost its state, whatever the others do.
+ * conversion was lost, or its pressure falls, and its temperature steps. So one that reads 0 is left out until its next
+ * temperature, which is asked for at once. One whose pressure falls at once with others' is doubtful until then, but
+ * used, for a release does the same where frames are 5 ms or more apart. If the temperature has stepped from the
+ * sensor's own last it has lost its state, whatever the others do.
  *
- * A suspect is left out until it has been reset and its PROM read again. Then its temperature and
- * its pressure count as its first. Its zero still holds, since it is the same sensor, unless it was
- * measured shortly before (condition.h). The same holds for a sensor whose pressure has stepped
- * alone, for example when it was reset for another's sake, or when it returns.
+ * A suspect is left out until it has been reset and its PROM read again. Then its temperature and its pressure count as
+ * its first. Its zero still holds, since it is the same sensor, unless it was measured shortly before (condition.h).
+ * The same holds for a sensor whose pressure has stepped alone, for example when it was reset for another's sake, or
+ * when it returns.
  *
- * A sensor whose temperature is apart from the others' (common/apart.h) since it came is
- * doubtful until it has read like them twice in a row: its PROM may be wrong in spite of its CRC.
+ * A sensor whose temperature is apart from the others' (common/apart.h) since it came is doubtful until it has read
+ * like them twice in a row: its PROM may be wrong in spite of its CRC.
  *
- * A sensor whose PROM has a wrong CRC is used, since one genuine part is known to have one. It is
- * doubtful. It must first have read like the others at two temperatures in a row. */
+ * A sensor whose PROM has a wrong CRC is used, since one genuine part is known to have one. It is doubtful. It must
+ * first have read like the others at two temperatures in a row. */
 #pragma once
 
 #include "common/limits.h"
@@ -46,11 +44,10 @@
 #define READINGS_TEMPERATURE_APART_cC 50
 /* Of one sensor, from one reading to the next. */
 #define READINGS_STEP_Pa_q10 (MS58XX_STEP_Pa * 1024)
-/* All others have moved by less: this factor times the noise of a reading (two of them differ by 1.4 of
- * it rms), or such a part of the step. Of 785 steps beyond 8 kPa that taps of a sphere of 6 mm make
- * from one frame to the next at 20 and 57 frames/s in a simulated pad of 6 mm with a pitch of 9 mm,
- * up to 6 mm outside the array, the loneliest moves a neighbour by 64 Pa and 1/160; on 12 mm by
- * 3.1 kPa and a quarter. At 410 frames/s and more none is so fast. */
+/* All others have moved by less: this factor times the noise of a reading (two of them differ by 1.4 of it rms), or
+ * such a part of the step. Of 785 steps beyond 8 kPa that taps of a sphere of 6 mm make from one frame to the next at
+ * 20 and 57 frames/s in a simulated pad of 6 mm with a pitch of 9 mm, up to 6 mm outside the array, the loneliest moves
+ * a neighbour by 64 Pa and 1/160; on 12 mm by 3.1 kPa and a quarter. At 410 frames/s and more none is so fast. */
 #define READINGS_STILL_NOISES 6
 /* From one reading to the next. Codes that are 3 % off make 8 kPa. */
 #define READINGS_JOLT_Pa_q10 (MS58XX_STEP_Pa * 768)
@@ -84,7 +81,8 @@ struct readings {
   uint32_t alone;          /* bitmap of one sensor: its last pressure stepped alone, ... */
   int32_t alone_to_Pa_q10; /* ... from last_Pa_q10 to here */
   uint32_t suspects;       /* bitmap: want a reset */
-  uint32_t jolted;         /* bitmap: left out until their temperature shows that they kept their state */
+  uint32_t jolted;         /* bitmap: doubtful until their temperature shows that they kept their state */
+  uint32_t zero;           /* bitmap: of those, left out */
   uint32_t reset_once;     /* bitmap: had one for that reason */
   uint32_t pardoned;       /* bitmap: and another one */
   uint32_t left_out;       /* since start: pressures below zero or that stepped alone */

@@ -574,6 +574,7 @@ bool scan_take(struct scan *scan, struct frame *frame) {
   }
   fill_head(scan, &scan->slot.conversion, frame);
   const uint32_t jolted = scan->readings.jolted;
+  scan->readings.zero = (scan->readings.zero & jolted) | scan->slot.zero;
   scan->readings.jolted |= scan->slot.zero;
   if (readings_take_pressures(&scan->readings, scan->slot.code, scan->slot.good, frame)) {
     report(scan);

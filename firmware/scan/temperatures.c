@@ -193,7 +193,8 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     readings->doubted &= ~bit;
     readings->has_thermal |= bit;
   }
-  readings->has_last &= ~readings->jolted; /* what they read before says no more */
+  /* What they read before says no more. */
+  readings->has_last &= ~(readings->jolted & (readings->suspects | readings->zero));
   readings->jolted &= ~taken->good | readings->suspects;
   news |= readings->jolted & ~readings->suspects ? READINGS_ASK_AGAIN : 0;
   readings->alike &= taken->admitted & ~taken->prom_changed;

@@ -150,6 +150,10 @@ TEST(test_other_warnings_keep_the_history) {
     fit.flags = GOOD_FIT | warnings[i];
     TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID, update());
   }
+  input.unsettled = 2; /* one such frame is passed over */
+  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
+  input.unsettled = 0;
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID, update());
 }
 
 TEST(test_saturation_and_lower_bound) {
