@@ -127,9 +127,7 @@ class ShearStatic(unittest.TestCase):
         for title in (
             "By pad and tangential force",
             "Where the misses lie",
-            "What is physics and what is ours",
             "Pads that end",
-            "Rubber that remembers",
             "Screws",
         ):
             self.assertIn(f"## {title}\n", text)

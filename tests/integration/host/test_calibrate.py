@@ -128,7 +128,7 @@ class Gains(CalibrateTest):
             self.assertIn("calibrated: it applies from now on", out)
             shown = self.shown()
             self.assert_gains(shown)
-            self.assertRegex(shown, r"^calibrated 20\d\d-\d\d-\d\d \d\d:\d\d UTC from \d\d placements, force scale 1.000 sd 0.100\n")
+            self.assertRegex(shown, r"^calibrated 20\d\d-\d\d-\d\d \d\d:\d\d UTC from \d\d placements, force scale 1.000 sd 0.800\n")
             self.assertEqual(self.calibrate("--erase", "--yes", "--port", self.port)[0], "erased: it is as if never calibrated\n")
             self.assertEqual(self.shown(), "not calibrated\n")
             self.assertEqual(self.calibrate("--erase", "--yes", "--port", self.port)[0], "not calibrated\n")

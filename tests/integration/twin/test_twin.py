@@ -267,7 +267,7 @@ class Usage(TwinTest):
     def test_wrong_words_are_told_in_one_line(self):
         for arguments, what in {
             ("glide",): 'there is no kind of scenario "glide"; give one of: grid, taps',
-            ("taps", "--indenter", "finger"): 'there is no indenter "finger"',
+            ("taps", "--indenter", "thumb"): 'there is no indenter "thumb"',
             ("taps", "--layer", "1"): "--layer 1 is out of range; give 3 to 20 mm",
             ("taps", "--layer", "nan"): "--layer nan is out of range",
             ("taps", "--effects", "noise"): 'there is no effect "noise"; give some of: dip, widths',
