@@ -1,6 +1,6 @@
 """Whether a circuit board is what its descriptor says: nets of all pads, values, places, holes. Reads the KiCad file as text.
 
-pcb_check.py     prints what is wrong with boards/<board>/pcb, one line each
+pcb_check.py     prints what is wrong with boards/*/pcb, one line each
 
 That the copper connects what the nets say, and nothing else, is for KiCad's design rule check (checks.pcb, where KiCad is installed).
 """
@@ -125,14 +125,10 @@ def wrong_nets(descriptor, board):
                 errors.append(f"{name} of {value} is between {ends}")
             own = board.pads[name, "1"]
             held |= {pad[0] for pad in found["3V3"] if math.dist(board.pads[pad][:2], own[:2]) < NEAR_mm}
-    errors += [
-        f"{net} is pulled up by {pulled[net]}, not {pulls.get(net)} ohms"
-        for net in pulls.keys() | pulled.keys()
-        if pulled[net] != [pulls.get(net)]
-    ]
-    return errors + [
-        f"{part} has no capacitor within {NEAR_mm} mm of its supply" for part in board.parts if part[0] == "U" and part not in held
-    ]
+    wrong_pulls = {net for net in pulls.keys() | pulled.keys() if pulled[net] != [pulls.get(net)]}
+    errors += [f"{net} is pulled up by {pulled[net]}, not {pulls.get(net)} ohms" for net in wrong_pulls]
+    alone = [part for part in board.parts if part[0] == "U" and part not in held]
+    return errors + [f"{part} has no capacitor within {NEAR_mm} mm of its supply" for part in alone]
 
 
 def wrong_places(board, sensors):
@@ -159,15 +155,10 @@ def wrong(text, descriptor, sensors):
 
 
 def main(root=HERE.parents[1]):
-    lines = [
-        f"{path.parents[1].name}: {line}"
-        for path in sorted(root.glob("boards/*/pcb/*.kicad_pcb"))
-        for line in wrong(
-            path.read_text(encoding="utf-8"),
-            json.loads((path.parents[1] / "board.json").read_text(encoding="utf-8")),
-            geometry.places(root),
-        )
-    ]
+    lines = []
+    for path in sorted(root.glob("boards/*/pcb/*.kicad_pcb")):
+        descriptor = json.loads((path.parents[1] / "board.json").read_text(encoding="utf-8"))
+        lines += wrong(path.read_text(encoding="utf-8"), descriptor, geometry.places(root))
     print("\n".join(lines) or "the circuit boards are what their descriptors say")
     return 1 if lines else 0
 

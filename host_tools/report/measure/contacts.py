@@ -197,6 +197,12 @@ class Contacts(Measure):
         self.call("motion_flags", self.own_array, pad, self.settings_of(pads, noise_Pa), ends, t_us, q10(readings_Pa), pressed, flags)
         return flags
 
+    def rubber(self, effects, layer_mm, seeds, t_s, base_Pa):
+        """What pads with these effects of the twin report [pad, time, sensor] of pressures on their bases."""
+        reported_Pa = np.empty(base_Pa.shape)
+        self.call("rubber", effects, layer_mm, seeds, t_s, base_Pa, reported_Pa)
+        return reported_Pa
+
 
 class Scenario:
     """A scenario of the twin. phases: scenario_phase, times from the beginning of the act; last_s: how long each act takes."""

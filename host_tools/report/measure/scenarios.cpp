@@ -52,6 +52,27 @@ static void thickness(Batch<const double, 1> width_mm, Batch<const double, 1> wi
 }
 MEASURE_ENTRY(thickness)
 
+// What pads with these effects (twin/effects.hpp), a seed for each, report of the pressures on their bases
+// [pad][time][sensor].
+static void rubber(std::string effects, double layer_mm, Batch<const std::int64_t, 1> seeds, Batch<const double, 1> t_s,
+                   Batch<const double, 3> base_Pa, Batch<double, 3> reported_Pa) {
+  same_length(seeds, base_Pa, reported_Pa);
+  const std::size_t sensors = base_Pa.size(2);
+  require(base_Pa.shape == reported_Pa.shape && t_s.size() == base_Pa.size(1), "other numbers of times or sensors");
+  const twin::EffectValues values = twin::parse_effects(effects);
+  in_parallel(seeds.size(), [&](std::size_t i) {
+    twin::Pad pad(values, sensors, layer_mm, twin::AMBIENT_Pa, static_cast<std::uint64_t>(seeds[i]));
+    std::vector<double> now, reports(sensors);
+    for (std::size_t t = 0; t < t_s.size(); t++) {
+      const double *base = base_Pa.row(i) + t * sensors;
+      now.assign(base, base + sensors);
+      pad.report(t_s[t], now, reports);
+      std::copy(reports.begin(), reports.end(), reported_Pa.row(i) + t * sensors);
+    }
+  });
+}
+MEASURE_ENTRY(rubber)
+
 struct scenario_options {
   char kind[16], contact_shape[16];
   double layer_mm, seconds;

@@ -15,13 +15,6 @@ struct Range {
   double low, high;
 };
 
-struct Ranges {
-  Range mass_kg, friction, kinetic_share, side, off_mm, com_share, lift_m_s2, delay_s;
-  double jitter_s, lost_share, gone_share;
-  std::uint64_t events_least, events_most;
-  double strength; // of events
-};
-
 // A row for each quantity, in it the kinds in their order. side: the two sides' friction differs by this share.
 // com_share: how far the centre of mass is off, as a share of half of the size; half of the objects have none.
 struct Rows {
@@ -46,13 +39,6 @@ constexpr Rows ALL = {
     {0, 2, 3, 1, 1},
     {0, 0.7, 1.0, 1.0, 0.4},
 };
-
-Ranges ranges_of(Kind kind) {
-  const auto k = static_cast<std::size_t>(kind);
-  return {ALL.mass_kg[k],    ALL.friction[k],     ALL.kinetic_share[k], ALL.side[k],     ALL.off_mm[k],
-          ALL.com_share[k],  ALL.lift_m_s2[k],    ALL.delay_s[k],       ALL.jitter_s[k], ALL.lost_share[k],
-          ALL.gone_share[k], ALL.events_least[k], ALL.events_most[k],   ALL.strength[k]};
-}
 
 struct Fragile {
   const char *name;
@@ -88,13 +74,13 @@ double acceleration_of(double t) { return t <= 0.0 || t >= 1.0 ? 0.0 : 60.0 * t 
 
 double draw(Random &random, const Range &range) { return random.uniform(range.low, range.high); }
 
-Event draw_event(Random &random, const Ranges &ranges, double begin_s, bool calm) {
+Event draw_event(Random &random, std::size_t of, double begin_s, bool calm) {
   Event event{};
   event.begin_s = begin_s;
   event.angle_rad = random.uniform(-M_PI, M_PI);
   event.kind =
       calm ? (random.next() % 2 ? Event::Kind::carry : Event::Kind::push) : static_cast<Event::Kind>(random.next() % 6);
-  const double strength = ranges.strength;
+  const double strength = ALL.strength[of];
   switch (event.kind) {
   case Event::Kind::knock:
     event.amount = strength * random.uniform(0.03, 0.12);
@@ -128,7 +114,7 @@ Event draw_event(Random &random, const Ranges &ranges, double begin_s, bool calm
 }
 
 // Shape and size, and what they do to the pads.
-void draw_shape(Random &random, const Ranges &ranges, KindOfGrasp &grasp) {
+void draw_shape(Random &random, std::size_t of, KindOfGrasp &grasp) {
   if (grasp.kind != Kind::fragile) {
     grasp.shape = DRAWN[random.next() % DRAWN.size()];
   }
@@ -136,16 +122,16 @@ void draw_shape(Random &random, const Ranges &ranges, KindOfGrasp &grasp) {
   grasp.height_mm = random.uniform(30.0, 80.0);
   grasp.depth_mm = random.uniform(20.0, 60.0);
   const double angle_rad = random.uniform(-M_PI, M_PI);
-  const double off_mm = (random.next() % 2 ? 0.5 : 0.0) * grasp.depth_mm * draw(random, ranges.com_share);
+  const double off_mm = (random.next() % 2 ? 0.5 : 0.0) * grasp.depth_mm * draw(random, ALL.com_share[of]);
   grasp.com_mm = {off_mm * std::cos(angle_rad), off_mm * std::sin(angle_rad)};
   stiffen(grasp);
 }
 
 KindOfGrasp draw_once(Random &random, Kind kind) {
-  const Ranges ranges = ranges_of(kind);
+  const auto of = static_cast<std::size_t>(kind);
   KindOfGrasp grasp{};
   grasp.kind = kind;
-  grasp.mass_kg = ranges.mass_kg.low > 0.0 ? random.log_uniform(ranges.mass_kg.low, ranges.mass_kg.high) : 0.0;
+  grasp.mass_kg = ALL.mass_kg[of].low > 0.0 ? random.log_uniform(ALL.mass_kg[of].low, ALL.mass_kg[of].high) : 0.0;
   if (kind == Kind::fragile) {
     const Fragile &fragile = FRAGILE[random.next() % std::size(FRAGILE)];
     grasp.object = fragile.name;
@@ -154,10 +140,10 @@ KindOfGrasp draw_once(Random &random, Kind kind) {
     grasp.crushes_N = fragile.crushes_N;
   }
   const double at_1_mm_N = random.log_uniform(2.0, 5.0), apart = random.uniform(-0.1, 0.1);
-  const double friction = draw(random, ranges.friction);
-  const double side = (random.next() % 2 ? 0.5 : -0.5) * draw(random, ranges.side);
+  const double friction = draw(random, ALL.friction[of]);
+  const double side = (random.next() % 2 ? 0.5 : -0.5) * draw(random, ALL.side[of]);
   const double gain_sd = random.uniform(0.01, 0.05), ratio = random.uniform(0.02, 0.05);
-  const double delay_s = draw(random, ranges.delay_s);
+  const double delay_s = draw(random, ALL.delay_s[of]);
   for (int i = 0; i < 2; i++) {
     const double sign = i == 0 ? 1.0 : -1.0, angle_rad = random.uniform(-M_PI, M_PI);
     grasp.pads[static_cast<std::size_t>(i)] = {at_1_mm_N * (1.0 + sign * apart),
@@ -171,21 +157,21 @@ KindOfGrasp draw_once(Random &random, Kind kind) {
   grasp.exponent = random.uniform(1.3, 1.9);
   grasp.shear_N_mm = random.log_uniform(2.0, 6.0);
   grasp.rubber_N_s_mm = random.uniform(0.004, 0.012);
-  grasp.kinetic_share = draw(random, ranges.kinetic_share);
+  grasp.kinetic_share = draw(random, ALL.kinetic_share[of]);
   grasp.stribeck_mm_s = random.log_uniform(1.0, 10.0);
-  draw_shape(random, ranges, grasp);
-  grasp.off_mm = (random.next() % 2 ? 1.0 : -1.0) * draw(random, ranges.off_mm);
+  draw_shape(random, of, grasp);
+  grasp.off_mm = (random.next() % 2 ? 1.0 : -1.0) * draw(random, ALL.off_mm[of]);
   grasp.table_friction = random.uniform(0.2, 0.6);
   grasp.opens_mm = 2.0 * std::abs(grasp.off_mm) + random.uniform(2.0, 5.0);
   grasp.waits_s = random.uniform(0.1, 0.4);
   grasp.lift_mm = random.uniform(20.0, 100.0);
-  const double lift_m_s2 = draw(random, ranges.lift_m_s2);
+  const double lift_m_s2 = draw(random, ALL.lift_m_s2[of]);
   grasp.lift_s = std::sqrt(EASED_ACCELERATION * 1e-3 * grasp.lift_mm / lift_m_s2);
   double t_s = grasp.lift_s;
-  const std::uint64_t more = ranges.events_most - ranges.events_least + 1;
-  for (std::uint64_t left = ranges.events_least + random.next() % more; left > 0; left--) {
+  const std::uint64_t more = ALL.events_most[of] - ALL.events_least[of] + 1;
+  for (std::uint64_t left = ALL.events_least[of] + random.next() % more; left > 0; left--) {
     t_s += random.uniform(0.4, 0.8);
-    grasp.events.push_back(draw_event(random, ranges, t_s, kind == Kind::fragile));
+    grasp.events.push_back(draw_event(random, of, t_s, kind == Kind::fragile));
     Event &event = grasp.events.back();
     if (kind == Kind::slick) {
       event = {Event::Kind::slick, t_s, random.uniform(0.005, 0.06), random.uniform(0.25, 0.55), 0.0, 0.0};
@@ -194,10 +180,10 @@ KindOfGrasp draw_once(Random &random, Kind kind) {
   }
   grasp.steady_s = t_s + 0.5;
   grasp.ends_s = grasp.steady_s + 4.0;
-  grasp.jitter_s = ranges.jitter_s;
-  grasp.lost_share = ranges.lost_share;
+  grasp.jitter_s = ALL.jitter_s[of];
+  grasp.lost_share = ALL.lost_share[of];
   const double gone = random.uniform(0.0, 1.0);
-  grasp.gone = gone < ranges.gone_share ? static_cast<int>(random.next() % 2) : -1;
+  grasp.gone = gone < ALL.gone_share[of] ? static_cast<int>(random.next() % 2) : -1;
   grasp.gone_s = random.uniform(-0.1, grasp.steady_s);
   grasp.poll_factor = random.uniform(1.6, 3.2);
   return grasp;
