@@ -86,9 +86,9 @@ void draw_caption(Canvas &canvas, const Caption &caption) {
     return;
   }
   /* Where both do not fit, the note has at least half of the line. */
-  const int left = canvas.columns() - 5 - static_cast<int>(caption.note.size());
+  const int left = canvas.columns() - 5 - columns_of(caption.note);
   const int room = caption.note.empty() ? canvas.columns() : std::max(left, canvas.columns() / 2);
-  int column = canvas.text(1, row, caption.keys.substr(0, static_cast<std::size_t>(room)), text_style(FAINT)) + 3;
+  int column = canvas.text(1, row, first_columns(caption.keys, room), text_style(FAINT)) + 3;
   canvas.text(column, row, caption.note, text_style(ACCENT, true));
 }
 
