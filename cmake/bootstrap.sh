@@ -214,7 +214,7 @@ if ! cmp -s cmake/mujoco.txt build/mujoco/.installed-requirements; then
   rm -rf build/mujoco
   pip=build/node/venv/bin/pip
   [ -x $pip ] || { /usr/bin/python3 -m venv build/mujoco/venv && pip=build/mujoco/venv/bin/pip; }
-  $pip --quiet --disable-pip-version-check install --no-deps --target build/mujoco -r cmake/mujoco.txt &&
+  $pip --quiet --disable-pip-version-check install --require-hashes --no-deps --target build/mujoco -r cmake/mujoco.txt &&
     cp cmake/mujoco.txt build/mujoco/.installed-requirements ||
     echo "bootstrap: pip cannot fetch MuJoCo: fingertip simulate --lift and the reports on grasps will not run" >&2
 fi

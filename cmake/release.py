@@ -121,7 +121,19 @@ def main(argv):
 
     print("tool, library and page", flush=True)
     mujoco = source / "build/mujoco"
-    run(sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target", mujoco, "-r", source / "cmake/mujoco.txt")
+    run(
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "--quiet",
+        "--require-hashes",
+        "--no-deps",
+        "--target",
+        mujoco,
+        "-r",
+        source / "cmake/mujoco.txt",
+    )
     build = source / "build/host"
     run(
         "cmake",
