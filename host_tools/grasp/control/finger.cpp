@@ -88,6 +88,7 @@ bool GripFinger::has_load() const {
 }
 
 void GripFinger::begin_zero() {
+  of_both_ = 1.0; // another object
   zero_x_N_ = zero_y_N_ = sum_x_N_ = sum_y_N_ = 0.0;
   sums_ = 0;
 }
@@ -152,9 +153,22 @@ void GripFinger::believe(const GripReading &reading) {
   is_doubted_ = false;
 }
 
-double GripFinger::along_N(const GripReading &reading) const {
-  return (reading.load_x_N * mark_x_N_ + reading.load_y_N * mark_y_N_) /
-         std::max(std::hypot(mark_x_N_, mark_y_N_), 1e-9);
+bool GripFinger::mark() {
+  mark_x_N_ = believed_.load_x_N, mark_y_N_ = believed_.load_y_N;
+  return is_marked_ = believed_.has_load;
+}
+
+double GripFinger::keeps(const GripReading &reading) const {
+  const double square = mark_x_N_ * mark_x_N_ + mark_y_N_ * mark_y_N_;
+  const double along = mark_x_N_ * reading.load_x_N + mark_y_N_ * reading.load_y_N;
+  return !is_marked_ ? 0.0 : reading.has_load && square > 0.0 ? along / square : 1.0;
+}
+
+double GripFinger::pull_N(const GripReading &reading) const {
+  if (!is_marked_) {
+    return std::numeric_limits<double>::max();
+  }
+  return reading.has_load ? std::hypot(reading.load_x_N - mark_x_N_, reading.load_y_N - mark_y_N_) : 0.0;
 }
 
 void GripFinger::doubt(const GripReading &reading) {
@@ -237,6 +251,8 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
     all.over = all.over || reading.over;
     all.touches += reading.contact;
     all.slides = all.slides || reading.slides;
+    all.keeps = std::max(all.keeps, fingers[i].keeps(reading));
+    all.pull_N = i == 0 ? fingers[i].pull_N(reading) : std::min(all.pull_N, fingers[i].pull_N(reading));
     all.delay_s = std::max(all.delay_s, reading.counts ? fingers[i].delay_s() : 0.0);
     all.trouble |= reading.is_left_out ? GRIP_FINGERS_DIFFER : 0u;
     all.force_N[i] = reading.has_force || reading.is_left_out ? reading.force_N : 0.0;
@@ -251,8 +267,6 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
     if (reading.has_load) {
       loads++;
       loads_N += reading.load_N;
-      all.along_N += fingers[i].along_N(reading);
-      all.pull_N += fingers[i].pull_N(reading);
       all.load_sd_N = std::max(all.load_sd_N, reading.load_sd_N);
       normal_N += reading.force_N;
       most_N = std::max(most_N, reading.load_N);
@@ -270,8 +284,6 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   all.grip_N = std::max(all.low_N, all.mean_N - std::max(all.high_N - all.low_N - settings.differ * all.high_N, 0.0));
   all.has_load = loads > 0;
   if (loads > 0) {
-    all.along_N /= loads;
-    all.pull_N /= loads;
     // Both share the load; if one carries far more, that one slides first.
     all.load_N = std::max(loads_N / loads, 0.8 * most_N);
     for (std::size_t i = 0; i < fingers.size(); i++) {

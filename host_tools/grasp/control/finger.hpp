@@ -80,13 +80,11 @@ public:
   void doubt(const GripReading &reading);
   double doubted_for_s(const GripReading &reading) const; // since the first frame that was doubted
 
-  // along_N and pull_N are of this load from now on.
-  void mark() { mark_x_N_ = believed_.load_x_N, mark_y_N_ = believed_.load_y_N; }
-  // The load along the marked one, and how far it is from it.
-  double along_N(const GripReading &reading) const;
-  double pull_N(const GripReading &reading) const {
-    return std::hypot(reading.load_x_N - mark_x_N_, reading.load_y_N - mark_y_N_);
-  }
+  // keeps and pull_N are of this load from now on. Without one, which is the answer, this fingertip has no say.
+  bool mark();
+  // Share of the marked load that this one has, along it, and how far it is from it. Without a load now: all, and 0.
+  double keeps(const GripReading &reading) const;
+  double pull_N(const GripReading &reading) const;
 
   // Sets the zero of the tangential force to its mean between begin and end.
   void begin_zero();
@@ -103,7 +101,7 @@ private:
   double force_t_s_ = 0.0, force_N_ = 0.0, sd_N_ = 0.0;
   GripReading believed_;
   double doubted_s_ = 0.0, of_both_ = 1.0, mark_x_N_ = 0.0, mark_y_N_ = 0.0;
-  bool is_doubted_ = false;
+  bool is_doubted_ = false, is_marked_ = false;
   int unchanged_ = 0; // frames whose values are those of the one before
   double zero_x_N_ = 0.0, zero_y_N_ = 0.0, sum_x_N_ = 0.0, sum_y_N_ = 0.0;
   int sums_ = 0;
@@ -120,9 +118,9 @@ struct GripReadings {
   bool fresh = false, over = false, has_load = false, slides = false;
   double load_N = 0.0; // tangential force at one fingertip, less its zero
   double load_sd_N = 0.0;
-  double along_N = 0.0, pull_N = 0.0; // GripFinger::mark: of the fingertips that have a load, the means
-  double ratio = 0.0;                 // tangential over normal force, of the fingertips that have both
-  double speed_mm_s = 0.0;            // sliding speed at the slower fingertip
+  double keeps = 0.0, pull_N = 0.0; // GripFinger::mark: the most and the least of the marked fingertips
+  double ratio = 0.0;               // tangential over normal force, of the fingertips that have both
+  double speed_mm_s = 0.0;          // sliding speed at the slower fingertip
   std::array<double, GRIP_FINGERS> force_N{};
   bool is_alone() const { return low_N < 0.5 * high_N; } // one fingertip carries most of the force
 };

@@ -98,11 +98,8 @@ bool Grip::request(GripRequest request) {
   case GRIP_REQUEST_PLACE:
   case GRIP_REQUEST_HAND_OVER:
     if (state_ != GRIP_HOLDING || settings_.mode == GRIP_MODE_FIXED || !readings_.has_load ||
-        (request == GRIP_REQUEST_PLACE && !hold_.is_loaded())) {
+        (request == GRIP_REQUEST_PLACE && !hold_.is_loaded()) || !(fingers_[0].mark() | fingers_[1].mark())) {
       return false;
-    }
-    for (GripFinger &finger : fingers_) {
-      finger.mark();
     }
     marked_N_ = readings_.load_N;
     kept_s_ = now_s_;
@@ -262,9 +259,8 @@ std::uint32_t Grip::hold() {
       return 0;
     }
     const bool places = holds_ == GRIP_PLACING;
-    readings_.load_N =
-        places ? std::clamp(readings_.along_N, 0.0, readings_.load_N) : std::min(readings_.load_N, marked_N_);
-    readings_.slides = readings_.slides && (places ? readings_.along_N > TAKEN * marked_N_ : true);
+    readings_.load_N = std::min(readings_.load_N, places ? readings_.keeps * marked_N_ : marked_N_);
+    readings_.slides = readings_.slides && (!places || readings_.keeps > TAKEN);
   }
   const double wanted_N = hold_.wants(readings_, reach_.coming_N(readings_, now_s_), settings_, now_s_, dead_s());
   const bool slides = hold_.is_sliding();
@@ -286,12 +282,11 @@ std::uint32_t Grip::hold() {
   return trouble;
 }
 
-// The table has the load, or someone pulls: for as long as a silence may last.
+// The table has the load, or someone pulls: for as long as a silence may last, and as every fingertip that had a load
+// reports. One that reports none any more is no evidence.
 bool Grip::is_taken() {
-  const bool kept = !readings_.has_load ||
-                    (holds_ == GRIP_PLACING ? readings_.along_N > TAKEN * marked_N_
-                                            : readings_.pull_N < settings_.pull_N &&
-                                                  !(readings_.slides && readings_.pull_N > 0.5 * settings_.pull_N));
+  const bool slides = readings_.slides && readings_.load_N > marked_N_ && readings_.pull_N > 0.5 * settings_.pull_N;
+  const bool kept = holds_ == GRIP_PLACING ? readings_.keeps > TAKEN : readings_.pull_N < settings_.pull_N && !slides;
   kept_s_ = kept ? now_s_ : kept_s_;
   return now_s_ - kept_s_ >= settings_.stale_s;
 }
@@ -417,7 +412,8 @@ GripReport Grip::step(double now_s, GripCommand &command) {
     enter(GRIP_FAULT);
   } else if (grasps && is_gone()) {
     // An object that only one fingertip has pushed was never held: the approach goes on.
-    enter(was_held_ || state_ != GRIP_SQUEEZE ? GRIP_DROPPED : GRIP_APPROACH);
+    const bool taken = state_ == GRIP_HANDING || (state_ == GRIP_SLIPPING && holds_ == GRIP_HANDING);
+    enter(taken ? GRIP_RELEASE : was_held_ || state_ != GRIP_SQUEEZE ? GRIP_DROPPED : GRIP_APPROACH);
   } else if (!silent && !(grasps && readings_.fingers > 0 && readings_.touches == 0)) {
     trouble_ |= go_on();
   }

@@ -137,7 +137,7 @@ private:
   double filled_s_ = 0.0; // last contact of any fingertip
   double moved_s_ = 0.0;  // last motion of an approach
   double ramped_s_ = 0.0; // last step of an approach or a release
-  double kept_s_ = 0.0;   // last time that the load was there, or nobody pulled
+  double kept_s_ = 0.0;   // last time that the load was there, or no one pulled
   double marked_N_ = 0.0; // load when PLACE or HAND_OVER was requested
   double even_s_ = 0.0;   // last time that both forces were alike, or the gripper moved
   bool may_activate_ = false, is_entered_ = false;

@@ -84,7 +84,7 @@ public:
   double off_mm = 0.0;  // the object presses fingertip 0 by so much more, fingertip 1 less
   double delay_s = 0.0; // of frames
   double frame_s = 1.0 / 410.0;
-  std::array<double, 2> gain{1.0, 1.0};
+  std::array<double, 2> gain{1.0, 1.0}, load_share{1.0, 1.0};
   double sd_share = 0.05; // of a force, as reported
   double sigma_mm = 6.0;
   std::array<bool, 2> slides{}, mute{}, frozen{};
@@ -122,7 +122,7 @@ private:
     touch.force_sd_N = sd_share * sensed_N;
     touch.sigma_mm = sigma_mm;
     touch.x_mm = frozen[finger] ? 0.0 : 1e-3 * (frames_ % 7);
-    touch.qy_N = (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 ? load_N : 0.0;
+    touch.qy_N = (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 ? load_share[finger] * load_N : 0.0;
     touch.speed_y_mm_s = slide_mm_s;
     return touch;
   }

@@ -269,3 +269,38 @@ TEST(Grip, PlacesOnATableAndHandsOverToAPull) {
     EXPECT_LT(world.peak_N, 1.03 * before_N) << to_N;
   }
 }
+
+// A fingertip without a load is no evidence that a table or a person has it.
+TEST(Grip, OpensByWhatEveryFingertipThatHadALoadReports) {
+  for (const std::size_t hidden : {0u, 1u}) {
+    for (const double to_N : {0.0, 3.2}) {
+      GripWorld world;
+      world.load_share[1] = 0.5;
+      world.grasp();
+      world.pull(2.0, 0.3);
+      world.run(2.0);
+      ASSERT_TRUE(world.grip.request(to_N > 2.0 ? GRIP_REQUEST_HAND_OVER : GRIP_REQUEST_PLACE));
+      world.drop_flags[hidden] = CONTACT_FLAG_TANGENTIAL_VALID;
+      world.run(0.5);
+      world.pull(to_N, 0.2);
+      world.run(0.3);
+      EXPECT_EQ(world.report.state, to_N > 2.0 ? GRIP_HANDING : GRIP_PLACING) << hidden;
+      world.drop_flags[hidden] = 0;
+      world.run(0.3);
+      EXPECT_EQ(world.report.state, GRIP_RELEASE) << hidden << to_N;
+    }
+  }
+}
+
+// Whose object is taken without a pull of that force has handed it over.
+TEST(Grip, HandsOverWhatIsGone) {
+  GripWorld world;
+  world.grasp();
+  world.pull(2.0, 0.3);
+  world.run(2.0);
+  ASSERT_TRUE(world.grip.request(GRIP_REQUEST_HAND_OVER));
+  world.run(0.1);
+  world.object_mm = 0.0;
+  world.run(0.2);
+  EXPECT_EQ(world.report.state, GRIP_RELEASE);
+}
