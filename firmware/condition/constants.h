@@ -61,6 +61,7 @@
 #define PAST_SHARE 1311       /* 2 % of it is the sd until a release shows it; the twin's after-effect: 2.3 % rms */
 #define PAST_SHARE_LEAST 655  /* 1 %: one release may hide it */
 #define PAST_SHARE_MOST 16384 /* a quarter; range */
+#define PAST_SHARE_FORCE 3277 /* a twentieth: twice the sd that it shows is the band of all, an eighth */
 #define PAST_SHOWS_ms ((uint32_t)MS(200)) /* after a contact; the remainder follows in 100 ms */
 #define PAST_LEAST_Pa 1000                /* less shows nothing beside noise and drift */
 #define PAST_LEARN_SHIFT 2                /* a quarter of what each release shows; choice */

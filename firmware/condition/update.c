@@ -54,6 +54,23 @@ static void follow_past(const struct step *step) {
   step->condition->past_sd_Pa_q10[step->k] = part_of(sensor->past_Pa_q10, sensor->past_share);
 }
 
+/* What five and more sensors all keep is a force that is left: rubber keeps unlike shares. Of fewer it may be either.
+ */
+static bool is_left_by_force(const struct condition *condition) {
+  int pressed = 0;
+  for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
+    const struct condition_sensor *sensor = &condition->sensor[k];
+    if (sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa)) {
+      const int32_t off = clamped_difference(sensor->before_Pa_q10, sensor->level_Pa_q10);
+      if (off <= part_of(sensor->past_Pa_q10, PAST_SHARE_FORCE)) {
+        return false;
+      }
+      pressed++;
+    }
+  }
+  return pressed >= 5;
+}
+
 /* What stands off after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd. */
 static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
   struct condition_sensor *sensor = step->sensor;
@@ -62,13 +79,12 @@ static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
     return;
   }
   step->condition->to_learn &= ~bit;
-  if (sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa)) {
-    const int32_t off = size_of(above_level_Pa_q10);
+  if (sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa) && !is_left_by_force(step->condition)) {
     const int32_t most = part_of(sensor->past_Pa_q10, PAST_SHARE_MOST);
-    const int32_t shown =
-        port_divide((off < most ? off : most) + (off < most ? off : most) / 4, sensor->past_Pa_q10 >> 16);
-    sensor->past_share += (shown - sensor->past_share) >> PAST_LEARN_SHIFT;
-    sensor->past_share = larger(sensor->past_share, PAST_SHARE_LEAST);
+    const int32_t off = clamp(size_of(above_level_Pa_q10) - step->condition->drifted_Pa_q10, 0, most);
+    const int32_t shown = port_divide(off + off / 4, sensor->past_Pa_q10 >> 16);
+    sensor->past_share =
+        larger(sensor->past_share + ((shown - sensor->past_share) >> PAST_LEARN_SHIFT), PAST_SHARE_LEAST);
   }
 }
 
@@ -292,10 +308,10 @@ static void follow(const struct step *step) {
   struct condition *condition = step->condition;
   struct condition_sensor *sensor = step->sensor;
   const bool unsure = condition->unsure;
+  condition->faded_Pa_q10[step->k] = 0;
   if (!unsure && settle(step)) {
     return;
   }
-  condition->faded_Pa_q10[step->k] = 0;
   const int32_t before = condition->zero_Pa_q10[step->k];
   const bool fresh = condition->gate.released_ms < FRESH_ms;
   const struct band band = band_of(step, fresh);

@@ -27,7 +27,7 @@ void run_s(float seconds) { run(frames_in(seconds)); }
 
 float contact_s, unflagged_s;
 
-static void watch_frame(void) {
+void watch_frame(void) {
   run(1);
   contact_s += conditioned.contact ? 1e-6f * (float)period_us : 0;
   unflagged_s += conditioned.contact && !conditioned.zero_doubtful ? 1e-6f * (float)period_us : 0;

@@ -23,9 +23,10 @@ void run(int count);
 int frames_in(float seconds);
 void run_s(float seconds);
 
-/* What the readings of these sensors rise by meanwhile. Leaves how long there was a contact, and
- * how long one that was not doubted. */
+/* What the readings of these sensors rise by meanwhile. Leaves how long there was a contact, and how long one that was
+ * not doubted; one frame adds to both. */
 extern float contact_s, unflagged_s;
+void watch_frame(void);
 void watch_s(float seconds, float slope_Pa_s, uint32_t sensors);
 
 /* A bump like that of a contact above sensor 7, up to 1. */
