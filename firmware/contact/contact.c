@@ -21,12 +21,13 @@ static bool shows_motion(const struct contact_input *input, uint32_t flags) {
 
 struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit,
                                    float largest_Pa) {
-  const bool exceeds = (fit->flags & CONTACT_FLAG_AT_BOUND) && fit->p0_Pa > largest_Pa;
-  const float share = exceeds ? largest_Pa / fit->p0_Pa : 1.0f, force_N = share * fit->force_N;
+  const bool is_known = !(fit->flags & CONTACT_FLAG_AT_BOUND) && fit->location_sd_mm <= fit->sigma_mm;
+  const bool exceeds = !is_known && fit->p0_Pa > largest_Pa;
+  const float force_N = exceeds ? fit->force_N * largest_Pa / fit->p0_Pa : fit->force_N;
   struct contact_force weighed = {settings->force_scale * force_N, 0.0f};
   if (fit->flags & CONTACT_FLAG_UNCERTAINTY_VALID) {
     weighed.force_sd_N =
-        fit_quadrature(settings->force_scale, share * fit->force_sd_N, settings->force_scale_sd, force_N);
+        fit_quadrature(settings->force_scale, exceeds ? force_N : fit->force_sd_N, settings->force_scale_sd, force_N);
   }
   return weighed;
 }

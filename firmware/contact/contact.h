@@ -45,9 +45,9 @@ struct contact_force {
 
 bool contact_is_lower_bound(const struct fit_result *fit, uint32_t saturated);
 
-/* The force of a fit, scaled; its standard deviation holds that of the scale. largest_Pa: reading. A fit at its bound
- * may have its middle, with any pressure, where no sensor is (76 254 N was seen at a release): its force is at most
- * what the largest reading makes of its width. */
+/* The force of a fit, scaled; its standard deviation holds that of the scale. largest_Pa: reading, of any size where a
+ * sensor is saturated. A fit at its bound, or whose middle is not known to within its width, may have any pressure
+ * there: its force is at most what the largest reading makes of its width, and so is its standard deviation. */
 struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit,
                                    float largest_Pa);
 

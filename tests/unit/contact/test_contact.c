@@ -18,6 +18,7 @@ void setUp(void) {
   fit.flags = GOOD_FIT;
   fit.used = 0x7FFF;
   fit.location_sd_mm = 0.5f;
+  fit.sigma_mm = 5.5f;
   fit.location_noise_mm = 0.01f;
   input = (struct contact_input){.contact = true, .tared = true, .fit = &fit};
 }
@@ -64,6 +65,11 @@ TEST(test_the_force_is_scaled_and_its_uncertainty_holds_that_of_the_scale) {
   fit.p0_Pa = 8000.0f; /* beyond the array */
   TEST_ASSERT_EQUAL_FLOAT(5.0f, contact_weigh(&scaled, &fit, 1000.0f).force_N);
   fit.flags |= CONTACT_FLAG_AT_BOUND;
+  force = contact_weigh(&scaled, &fit, 1000.0f);
+  TEST_ASSERT_EQUAL_FLOAT(0.625f, force.force_N);
+  TEST_ASSERT_TRUE(force.force_sd_N >= force.force_N);
+  fit.flags &= ~(uint32_t)CONTACT_FLAG_AT_BOUND;
+  fit.location_sd_mm = 1.1f * fit.sigma_mm;
   TEST_ASSERT_EQUAL_FLOAT(0.625f, contact_weigh(&scaled, &fit, 1000.0f).force_N);
   fit.flags &= ~(uint32_t)CONTACT_FLAG_UNCERTAINTY_VALID;
   TEST_ASSERT_EQUAL_FLOAT(0.0f, contact_weigh(&scaled, &fit, 1000.0f).force_sd_N);
