@@ -6,6 +6,10 @@
 #include <math.h>
 #include <stdbool.h>
 
+#ifdef FIT_GRID_ANY
+_Thread_local int fit_grid_columns, fit_grid_rows; /* fit_grid_parts.h */
+#endif
+
 #define POSITION_MAX_mm 10000.0f
 #define MARGIN 1.5f   /* pitches around the array in which a contact may lie */
 #define ON_NODE 1e-4f /* pitches; the same off a line */

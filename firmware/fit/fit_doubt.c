@@ -86,7 +86,8 @@ static bool take_readings(const struct fit_array *array, const int32_t *pressure
       count++;
     }
   }
-  if (count < FIT_DOUBT_SENSORS || count > FIT_DOUBT_SENSORS_MAX || largest <= 0) {
+  const int most = FIT_DOUBT_SENSORS_MAX > 24 && fit_is_rectangle(array) ? FIT_DOUBT_SENSORS_MAX : 24;
+  if (count < FIT_DOUBT_SENSORS || count > most || largest <= 0) {
     return false;
   }
   look->count = count;

@@ -46,10 +46,10 @@
 /* One factor of the separable Gaussian, and the polynomials that are orthogonal under its square.
  * p1 = k - mean and p2 = k^2 - k slope + constant, k the node number. */
 struct factor {
-  int32_t g[MAX_NODES];      /* Q30, 1 at the nearest node */
-  int32_t g_q14[MAX_NODES];  /* the same */
-  int32_t linear[MAX_NODES]; /* g p1, |.| <= 2^15, value = integer * 2^-linear_q */
-  int32_t square[MAX_NODES]; /* g p2, |.| <= 2^15, value = integer * 2^-square_q */
+  int32_t g[MOST_ALONG];      /* Q30, 1 at the nearest node */
+  int32_t g_q14[MOST_ALONG];  /* the same */
+  int32_t linear[MOST_ALONG]; /* g p1, |.| <= 2^15, value = integer * 2^-linear_q */
+  int32_t square[MOST_ALONG]; /* g p2, |.| <= 2^15, value = integer * 2^-square_q */
   int32_t linear_q;
   int32_t mass_q26;    /* sum of g^2 */
   int32_t linear_norm; /* sum of linear^2 / 8 */
@@ -111,7 +111,7 @@ FIXED_INLINE void set_polynomials(struct factor *f, int nodes, int origin) {
   f->mean = fixed_div_q26(first, mass);
   int32_t mean_square = fixed_div_q26(second, mass);
 
-  int32_t values[MAX_NODES];
+  int32_t values[MOST_ALONG];
   UNROLL for (int i = 0; i < nodes; i++) { values[i] = fixed_mul_q32(f->g[i], ((i - origin) * ONE_Q26 - f->mean) * 4); }
   int32_t shift = shift_to(15, vector_size(values, nodes));
   vector_shift(values, f->linear, nodes, shift);
@@ -181,7 +181,7 @@ static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_
     p += ROWS;
     residual += ROWS;
   }
-  sum += (sum >> 8) + 2 * NODES; /* what the rounding may add */
+  sum += (sum >> 8) + 2 * (uint32_t)NODES; /* what the rounding may add */
   int32_t shift = shift_to(RESIDUAL_SUM_BITS - 4, sum), half = (1 << shift) >> 1;
   for (int i = 0; i < COLUMNS; i++) {
     residual -= ROWS;
@@ -194,7 +194,7 @@ static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_
  * sums over rows and columns do. */
 static NOINLINE void project(struct moments *m, const int32_t *values, int32_t shift, struct fit_system *system) {
   const struct factor *x = &m->x, *y = &m->y;
-  int32_t over_y[COLUMNS] = {0};
+  int32_t over_y[MOST_COLUMNS] = {0};
   int32_t b2 = 0, b3_y = 0;
   for (int j = 0; j < ROWS; j++) {
     int32_t over_x = 0, g = y->g_q14[j];
@@ -367,7 +367,7 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
 /* Each column is g of one axis at least, so that what a sensor moves is a number of its column of
  * nodes times gy and one of its row times gx. */
 struct moves {
-  int32_t column[COLUMNS], row[ROWS];
+  int32_t column[MOST_COLUMNS], row[MOST_ROWS];
 };
 
 /* As fit_grid_add_moves, without the room for the moves. */
@@ -549,7 +549,7 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
       }
     }
   }
-  int32_t across[MAX_NODES], along[MAX_NODES] = {0}, weighted_x[MAX_NODES], weighted_y[MAX_NODES];
+  int32_t across[MOST_ALONG], along[MOST_ALONG] = {0}, weighted_x[MOST_ALONG], weighted_y[MOST_ALONG];
   for (int i = 0; i < COLUMNS; i++) {
     int32_t sum = 0, at_peak = p[i * ROWS + peak_row];
     UNROLL for (int j = 0; j < ROWS; j++) {
@@ -594,6 +594,7 @@ static NOINLINE void take_out(const struct fit_array *array, const int32_t *pres
 bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
               struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
+  fit_use_rectangle(grid);
   struct readings readings;
   struct moments m;
   struct fit_system system;

@@ -21,7 +21,7 @@
  * LINEAR_Q, |.| < 2^30, that of degree two in SQUARE_Q, |.| < 2^31. Their coefficients are held to
  * what a press can ask for, and used with 12 bits after the point: what that leaves to be
  * orthogonal is dealt with as the rest is. */
-#define LINEAR_Q (MAX_NODES > 5 ? 24 : 25)
+#define LINEAR_Q (COLUMNS > 5 || ROWS > 5 ? 24 : 25)
 #define LINEAR_ONE (1 << LINEAR_Q)
 #define LINEAR_TO_Q26 (1 << (26 - LINEAR_Q))
 #define SQUARE_Q (LINEAR_Q - 1)
@@ -59,7 +59,7 @@ struct node {
  * under the previous iterate, about the present mean; what is missing to be orthogonal under the
  * present one is small, and the factors below take it out of the right-hand side. */
 struct columns {
-  struct node node[NODES];
+  struct node node[MOST_NODES];
   bool dip;
   int32_t narrowness_q12;      /* sigma^2 over that of the dip */
   int32_t centre_x, centre_y;  /* LINEAR_Q */
@@ -116,7 +116,7 @@ FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t bits, int
 
 /* A polynomial as it applies to the model or on the dip: a part along x plus one along y. */
 struct polynomial {
-  int32_t x[COLUMNS], y[ROWS];
+  int32_t x[MOST_COLUMNS], y[MOST_ROWS];
 };
 
 /* The same of the dip, taken from a column. Returns the size with its own. */
@@ -283,7 +283,7 @@ static NOINLINE int32_t project_out(const struct columns *c, int32_t *column, in
     *column -= times_q12(model_q15(&c->node[k]), share_q12);
     column += STEP;
   }
-  sum = MASS_SHIFT > NORM_SHIFT ? sum << (MASS_SHIFT - NORM_SHIFT) : sum;
+  sum = MASS_SHIFT > NORM_SHIFT ? sum * (1 << (MASS_SHIFT - NORM_SHIFT)) : sum;
   *norm = remaining(*norm, times_q12(sum, share_q12));
   return to_poly(share_q12, 15 - q, LIFT_LIMIT);
 }
@@ -300,7 +300,7 @@ static NOINLINE void fill_columns(const struct readings *readings, const struct 
     dip2 = &dips.p2;
     dip3 = &dips.p3;
   }
-  int32_t dx[COLUMNS], dy[ROWS], square_x[COLUMNS], square_y[ROWS];
+  int32_t dx[MOST_COLUMNS], dy[MOST_ROWS], square_x[MOST_COLUMNS], square_y[MOST_ROWS];
   int32_t mean_x = c->mean_x, mean_y = c->mean_y;
   int32_t cross = c->cross >> COEFFICIENT_SHIFT;
   int32_t skew_x = c->skew_x >> COEFFICIENT_SHIFT, skew_y = c->skew_y >> COEFFICIENT_SHIFT;
@@ -397,7 +397,7 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   int32_t least = (largest >> 7) + (largest >> 9);
   least = noise * GUESS_NOISES > least ? noise * GUESS_NOISES : least;
   least = least < largest ? least : largest;
-  int32_t weighted[NODES];
+  int32_t weighted[MOST_NODES];
   for (int k = 0; k < NODES; k++) {
     int32_t p = readings->q28[k];
     bool enters = p >= least;
@@ -449,7 +449,7 @@ static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes,
 /* The model at the sensors in use, relative to the power of two of the strongest. Returns log2 of
  * the model at the centre in that unit, Q22. */
 static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused, struct columns *c) {
-  int32_t factor_x[COLUMNS], factor_y[ROWS], shift_x[COLUMNS], shift_y[ROWS];
+  int32_t factor_x[MOST_COLUMNS], factor_y[MOST_ROWS], shift_x[MOST_COLUMNS], shift_y[MOST_ROWS];
   int32_t offset_x = set_factor(factor_x, shift_x, COLUMNS, ORIGIN_X, at->x, at->height);
   int32_t offset_y = set_factor(factor_y, shift_y, ROWS, ORIGIN_Y, at->y, at->height);
   int32_t strongest = INT32_MAX;
@@ -655,6 +655,7 @@ static bool gather(const struct fit_array *array, const int32_t *pressure_Pa_q10
 bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                      const struct fit_settings *settings, struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
+  fit_use_rectangle(grid);
   struct readings readings;
   int count;
   memset(result, 0, sizeof *result);
@@ -714,6 +715,7 @@ static int32_t share_of(int32_t value, int32_t sum, int32_t sum_shift) {
 int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                      const struct fit_settings *settings, const struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
+  fit_use_rectangle(grid);
   struct readings readings;
   int count;
   if (!gather(array, pressure_Pa_q10, usable, settings, &readings, &count) || count < 6) {

@@ -164,7 +164,7 @@ void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressur
 /* Of the nodes along an axis: the Gaussian's factor, and from the contact x / sigma^2 per pitch and
  * x^2 / sigma^2. */
 struct own_axis {
-  int32_t bell_q30[MAX_NODES], slope_q11[MAX_NODES], square_q11[MAX_NODES];
+  int32_t bell_q30[MOST_ALONG], slope_q11[MOST_ALONG], square_q11[MOST_ALONG];
 };
 
 static NOINLINE void set_own_axis(int32_t nodes, int32_t centre, int32_t height, struct own_axis *axis) {

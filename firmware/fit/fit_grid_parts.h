@@ -10,10 +10,27 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+/* The rectangle; and room for it, where each thread has its own (fit_types.h). */
+#ifdef FIT_GRID_ANY
+extern _Thread_local int fit_grid_columns, fit_grid_rows;
+#define COLUMNS fit_grid_columns
+#define ROWS fit_grid_rows
+#define MOST_COLUMNS FIT_GRID_MAX_NODES
+#define MOST_ROWS FIT_GRID_MAX_NODES
+static inline void fit_use_rectangle(const struct fit_grid_shape *grid) {
+  COLUMNS = grid->columns;
+  ROWS = grid->rows;
+}
+#else
 #define COLUMNS FIT_GRID_COLUMNS
 #define ROWS FIT_GRID_ROWS
+#define MOST_COLUMNS COLUMNS
+#define MOST_ROWS ROWS
+#define fit_use_rectangle(grid) ((void)(grid))
+#endif
 #define NODES (COLUMNS * ROWS)
-#define MAX_NODES (COLUMNS > ROWS ? COLUMNS : ROWS)
+#define MOST_NODES FIT_GRID_MOST_NODES
+#define MOST_ALONG (MOST_COLUMNS > MOST_ROWS ? MOST_COLUMNS : MOST_ROWS)
 #define ONE_Q26 (1 << 26)
 #define NOINLINE __attribute__((noinline))
 
@@ -28,10 +45,10 @@
 /* The pressures of one frame in grid order [column][row], the largest from 0.5 to 1; where there is
  * a dip, half of that, so that what it takes finds room. */
 struct readings {
-  int32_t q28[NODES], q14[NODES];
-  int32_t residual[NODES]; /* room for the kernel */
-  int32_t shift;           /* Q28 = 1/1024 Pa times 2^shift */
-  int32_t largest;         /* 1/1024 Pa */
+  int32_t q28[MOST_NODES], q14[MOST_NODES];
+  int32_t residual[MOST_NODES]; /* room for the kernel */
+  int32_t shift;                /* Q28 = 1/1024 Pa times 2^shift */
+  int32_t largest;              /* 1/1024 Pa */
   int32_t largest_q28;
   struct scaled prior_sigma, prior_weight; /* pitches, per pitch; weight 0: none */
   struct scaled prior_sd;                  /* of its row, in units of q28 */
@@ -114,7 +131,7 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
 
 /* The dip's Gaussian, a product as the contact's is: its factors at the nodes, Q30. */
 struct dip {
-  int32_t x[COLUMNS], y[ROWS];
+  int32_t x[MOST_COLUMNS], y[MOST_ROWS];
 };
 /* Sets the factors about this contact, whose model is amplitude 2^rise at the centre, and returns
  * the dip's depth there, at most most_q28. height: of the dip's Gaussian, Q26; share: its depth, of

@@ -159,7 +159,7 @@ NOINLINE void fit_grid_begin_spread(const struct fit_grid_shape *grid, const str
 
 NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings,
                                   const struct state *at, struct readings *room, struct fit_spread *spread) {
-  int32_t down_x[COLUMNS], down_y[ROWS];
+  int32_t down_x[MOST_COLUMNS], down_y[MOST_ROWS];
   set_down(down_x, COLUMNS, COLUMNS / 2, at->x, at->height);
   set_down(down_y, ROWS, ROWS / 2, at->y, at->height);
   const int32_t *at_node = room->q28;

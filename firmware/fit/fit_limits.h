@@ -113,7 +113,11 @@ static inline bool fit_steps_want_dip(const struct fit_array *array, const struc
 
 /* Whether the sensors are the rectangle of the build. */
 static inline bool fit_is_rectangle(const struct fit_array *array) {
+#ifdef FIT_GRID_ANY
+  return array->grid.columns > 0;
+#else
   return array->grid.columns == FIT_GRID_COLUMNS && array->grid.rows == FIT_GRID_ROWS;
+#endif
 }
 
 /* What a reading below zero counts as. */

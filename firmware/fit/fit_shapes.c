@@ -141,6 +141,7 @@ enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct f
                                          const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                                          const struct fit_result *fit, struct fit_shapes_state *state,
                                          struct fit_shapes_result *result) {
+  fit_use_rectangle(&array->grid);
   const bool first = state->part == 0;
   if (first && !take(array, pressure_Pa_q10, settings, fit, pad)) {
     return forget(state, result);

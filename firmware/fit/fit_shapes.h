@@ -23,7 +23,7 @@
 #include "fit/fit_fixed.h"
 
 #define FIT_SHAPES_UNKNOWNS 9
-#define FIT_SHAPES_NODES (FIT_GRID_COLUMNS * FIT_GRID_ROWS)
+#define FIT_SHAPES_NODES FIT_GRID_MOST_NODES
 
 /* With fewer sensors there are hardly more readings than unknowns. */
 #define FIT_SHAPES_SENSORS 12

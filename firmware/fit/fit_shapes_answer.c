@@ -158,8 +158,8 @@ static bool explains_as_well(int32_t chi_square_q8, int32_t than_q8) {
  * discs (4) and balls (5), squares of the same spread overlap last. */
 static bool can_be_two(const struct fit_shapes_at *pair) {
   const int32_t *at = pair->value, square_q20 = fit_shapes_span_square(at);
-  uint32_t reach_x = fixed_size(at[PLACE_X]) + fixed_size(at[SPAN_X]);
-  uint32_t reach_y = fixed_size(at[PLACE_Y]) + fixed_size(at[SPAN_Y]);
+  int32_t reach_x = (int32_t)(fixed_size(at[PLACE_X]) + fixed_size(at[SPAN_X]));
+  int32_t reach_y = (int32_t)(fixed_size(at[PLACE_Y]) + fixed_size(at[SPAN_Y]));
   return square_q20 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10 && square_q20 > SQUARE * at[SPREAD] &&
          reach_x < COLUMNS / 2 * ONE_Q20 + BESIDE_Q20 && reach_y < ROWS / 2 * ONE_Q20 + BESIDE_Q20;
 }

@@ -46,6 +46,7 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
   pad->per_spread_sd_q4 = per_sd_q4 < PER_SD_MAX_Q4 ? per_sd_q4 : PER_SD_MAX_Q4;
   pad->spread_least_q20 = -(pad->variance_q26[0] >> 9); /* an eighth */
   pad->spread_most_q20 = fit_fixed(0.75f * V, 20);
+  fit_use_rectangle(&array->grid);
   uint8_t origin = array->grid.sensor[COLUMNS / 2 * ROWS + ROWS / 2];
   pad->pitch_mm = array->pitch_mm;
   pad->per_pitch = per;

@@ -23,11 +23,12 @@ _Static_assert(PULL_Y + 1 == UNKNOWNS, "a column for each");
 _Static_assert(MODELS == FIT_SHAPES_PARTS, "a part for each");
 
 #define ONE_Q20 (1 << 20)
-#define FREEDOM 9 /* readings and priors less the unknowns of two */
+#define FREEDOM (NODES - 6) /* readings and priors less the unknowns of two */
 #define PER_SD_MAX_Q4 1024
 
-#define PLACE_X_MAX ((5 << 20) / 2)
-#define PLACE_Y_MAX ((7 << 20) / 2)
+/* One and a half pitches beyond the outer nodes. */
+#define PLACE_X_MAX ((2 * (COLUMNS / 2) + 3) * (ONE_Q20 / 2))
+#define PLACE_Y_MAX ((2 * (ROWS / 2) + 3) * (ONE_Q20 / 2))
 #define AMPLITUDE_MAX ((4 << 20) - 1)
 #define AMPLITUDE_LEAST (1 << 13)
 
@@ -45,12 +46,12 @@ struct terms {
 
 /* exp(-d^2 / (2 v)) along both axes, whose products are the bells at the nodes. */
 struct bell {
-  int32_t x_q15[COLUMNS], y_q15[ROWS];
+  int32_t x_q15[MOST_COLUMNS], y_q15[MOST_ROWS];
 };
 
 /* d^2 of the nodes along an axis. */
 struct squares {
-  int32_t x_q24[COLUMNS], y_q24[ROWS];
+  int32_t x_q24[MOST_COLUMNS], y_q24[MOST_ROWS];
 };
 
 /* fit_shapes_model.c */

@@ -13,10 +13,11 @@
 
 /* Columns are at most 2 pitches or units of the readings, in Q(27 - COLUMN_SHIFT). */
 #define COLUMN_MAX ((1 << 16) - 1)
-#define COLUMN_SHIFT 15
-#define PRIOR_MAX ((1 << 13) - 1)
+#define COLUMN_SHIFT (NODES > 15 ? 16 : 15)
+#define COLUMN_BITS (28 - COLUMN_SHIFT) /* so that sums over the nodes and a prior hold */
+#define PRIOR_MAX ((1 << COLUMN_BITS) - 1)
 
-/* The column with its weights, 13 bits at most; returns the sum of its squares. */
+/* The column with its weights and bits; returns the sum of its squares. */
 static NOINLINE int32_t put_column(struct fit_shapes_pad *pad, int u) {
   const int32_t *row = &pad->room.row[0][u], *weight_q12 = pad->room.weight_q12;
   int32_t *column = pad->room.column[u];
@@ -36,7 +37,7 @@ static NOINLINE int32_t put_column(struct fit_shapes_pad *pad, int u) {
 /* The same of the residuals, as many bits as there are. */
 static NOINLINE int32_t put_residuals(struct fit_shapes_pad *pad, uint32_t size,
                                       struct fit_shapes_equations *equations) {
-  int32_t shift = fixed_bits(size) - 13;
+  int32_t shift = fixed_bits(size) - COLUMN_BITS;
   shift = shift < 1 ? 1 : shift;
   equations->q[RESIDUAL] = (int8_t)(28 - shift);
   const int32_t *row = &pad->room.row[0][RESIDUAL];
@@ -109,7 +110,7 @@ static NOINLINE void form(struct fit_shapes_pad *pad, const struct priors *prior
     equations->q[u] = (int8_t)(27 - COLUMN_SHIFT + up[u]);
   }
   for (int a = 0; a < equations->count; a++) {
-    int32_t(*column)[NODES] = pad->room.column;
+    int32_t(*column)[MOST_NODES] = pad->room.column;
     int32_t sums[2];
     int b = 0;
     for (; b + 1 < a; b += 2) {
@@ -152,12 +153,11 @@ static NOINLINE void substitute(const struct fit_shapes_equations *equations, co
   }
 }
 
-static const int32_t limit_of[UNKNOWNS] = {AMPLITUDE_MAX, PLACE_X_MAX, PLACE_Y_MAX, 0, ONE_Q20 / 8,
-                                           SPAN_MAX,      SPAN_MAX,    0,           0};
-
 static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
                                const struct fit_shapes_equations *equations, const int32_t *x_q20,
                                struct fit_shapes_at *at) {
+  const int32_t limit_of[UNKNOWNS] = {AMPLITUDE_MAX, PLACE_X_MAX, PLACE_Y_MAX, 0, ONE_Q20 / 8,
+                                      SPAN_MAX,      SPAN_MAX,    0,           0};
   int32_t move[UNKNOWNS], most_q14 = 1 << 14;
   int32_t amplitude = at->value[AMPLITUDE];
   for (int u = 0; u < equations->count; u++) {

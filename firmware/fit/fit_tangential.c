@@ -104,6 +104,7 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, 
     pad->strength_q26[j] = q26_from(strength);
   }
   float per_square = per_unit * per_unit;
+  fit_use_rectangle(&array->grid);
   uint8_t origin = array->grid.sensor[COLUMNS / 2 * ROWS + ROWS / 2];
   pad->unit_q25_mm = (int32_t)(unit_mm * 33554432.0f);
   pad->per_unit_q30 = (int32_t)(per_unit * 1073741824.0f);
@@ -348,6 +349,7 @@ static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
 void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,
                              const struct fit_settings *settings, const struct fit_result *fit,
                              struct fit_tangential_state *state, struct fit_tangential *result) {
+  fit_use_rectangle(&array->grid);
   *result = (struct fit_tangential){0};
   struct problem problem;
   problem.pad = pad;

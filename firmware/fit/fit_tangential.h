@@ -24,7 +24,7 @@
 
 #define FIT_TANGENTIAL_UNKNOWNS 8
 #define FIT_TANGENTIAL_TERMS (PAD_NORMAL_TERMS + PAD_TANGENTIAL_TERMS)
-#define FIT_TANGENTIAL_NODES (FIT_GRID_COLUMNS * FIT_GRID_ROWS)
+#define FIT_TANGENTIAL_NODES FIT_GRID_MOST_NODES
 
 /* Working memory of one estimate: in no need of being kept between two. */
 union fit_tangential_node {

@@ -32,8 +32,8 @@ FIXED_INLINE void set_offset(int32_t d_q12, int32_t pull_q13, int32_t e1_q17, in
 
 /* One term, strength V0 / v exp(-d' d / (2 v)). */
 struct term {
-  int32_t x_q28[COLUMNS]; /* with the strength */
-  int32_t y_q30[ROWS];
+  int32_t x_q28[MOST_COLUMNS]; /* with the strength */
+  int32_t y_q30[MOST_ROWS];
   int32_t over_q11, over_square_q7; /* 1 / v, at most 16, and its square */
   int32_t height_q28;               /* the strength over v, or over v^2 */
 };
@@ -157,7 +157,7 @@ NOINLINE static void set_dip_axis(int32_t bend_q22, int32_t by_square, int32_t n
  * contact does without. */
 NOINLINE static void take_dip(const struct problem *problem, int32_t t_q26, const struct parabola *axes,
                               int32_t amplitude_q13, struct fit_tangential_room *room) {
-  int32_t x_q15[COLUMNS], y_q15[ROWS];
+  int32_t x_q15[MOST_COLUMNS], y_q15[MOST_ROWS];
   int32_t v = problem->dip_variance_q26 + t_q26;
   int32_t inverse_q26 = fixed_div_q26(ONE_Q26, v < DIP_VARIANCE_LEAST_Q26 ? DIP_VARIANCE_LEAST_Q26 : v); /* 1 / v */
   int32_t bend_q22 = fixed_mul_q26(inverse_q26 >> 4, LOG2E_HALF_Q26);
@@ -256,7 +256,7 @@ NOINLINE static void set_still(const struct offset *x, const struct offset *y, u
 void fit_tangential_linearise(const struct problem *problem, const struct fit_tangential_unknowns *at,
                               struct fit_tangential_room *room) {
   const struct fit_pad *pad = problem->pad;
-  struct offset off_x[COLUMNS], off_y[ROWS];
+  struct offset off_x[MOST_COLUMNS], off_y[MOST_ROWS];
   struct term terms[FIT_TANGENTIAL_TERMS];
   const struct parabola axes[2] = {{fixed_mul_q26(at->x_q26, at->x_q26), fixed_mul_q26(at->x_q26, pad->pitch_q26)},
                                    {fixed_mul_q26(at->y_q26, at->y_q26), fixed_mul_q26(at->y_q26, pad->pitch_q26)}};

@@ -18,7 +18,13 @@ static void set_priors(const struct problem *problem, const struct fit_tangentia
   priors->residual[SLANT] = fixed_mul_q28(-at->e2_q26, problem->long_prior_q26);
 }
 
-/* Brings residuals to 14 bits; returns their Q less one. */
+/* Bits of a column, so that sums over the nodes and a prior hold; residuals have one more. */
+#define COLUMN_BITS (NODES > 15 ? 12 : 13)
+#define SCALE_MOST (15 - COLUMN_BITS)
+/* Nodes that a loop takes at a time. */
+#define TOGETHER (NODES % 3 == 0 ? 3 : NODES % 2 == 0 ? 2 : 1)
+
+/* Brings residuals to their bits; returns their Q less one. */
 NOINLINE static int32_t normalise_residuals(int32_t *residual, struct priors *priors) {
   uint32_t largest = 1;
   for (int k = 0; k < NODES; k++) {
@@ -28,7 +34,7 @@ NOINLINE static int32_t normalise_residuals(int32_t *residual, struct priors *pr
     largest |= fixed_size(priors->residual[u]);
   }
   /* What rounding carries over counts as a bit more. */
-  int32_t shift = fixed_bits(largest + (largest >> 8)) - 14;
+  int32_t shift = fixed_bits(largest + (largest >> 8)) - (COLUMN_BITS + 1);
   int32_t down = shift > 0 ? shift : 0, up = shift < 0 ? -shift : 0;
   int32_t half = (1 << down) >> 1;
   for (int k = 0; k < NODES; k++) {
@@ -50,9 +56,11 @@ struct equations {
 /* Over a column, whose elements are UNKNOWNS apart. */
 NOINLINE static uint32_t column_size(const int32_t *column, uint32_t largest) {
   const int32_t *end = column + NODES * UNKNOWNS;
+  const int together = TOGETHER;
   do {
-    largest |= fixed_size(column[0]) | fixed_size(column[UNKNOWNS]) | fixed_size(column[2 * UNKNOWNS]);
-    column += 3 * UNKNOWNS;
+    largest |= fixed_size(column[0]) | (together > 1 ? fixed_size(column[UNKNOWNS]) : 0) |
+               (together > 2 ? fixed_size(column[2 * UNKNOWNS]) : 0);
+    column += together * UNKNOWNS;
   } while (column != end);
   return largest;
 }
@@ -61,35 +69,35 @@ NOINLINE static uint32_t column_size(const int32_t *column, uint32_t largest) {
 NOINLINE static int32_t shift_column(int32_t *column, const int32_t *residual, int32_t shift, int32_t *right) {
   const int32_t *end = residual + NODES;
   int32_t own = 0, other = *right, half = (1 << shift) >> 1;
+  const int together = TOGETHER;
   do {
-    _Pragma("GCC unroll 3") for (int k = 0; k < 3; k++) {
+    _Pragma("GCC unroll 3") for (int k = 0; k < together; k++) {
       int32_t value = (column[k * UNKNOWNS] + half) >> shift;
       column[k * UNKNOWNS] = value;
       other += value * residual[k];
       own += value * value;
     }
-    column += 3 * UNKNOWNS;
-    residual += 3;
+    column += together * UNKNOWNS;
+    residual += together;
   } while (residual != end);
   *right = other;
   return own;
 }
-_Static_assert(NODES % 3 == 0, "three at a time");
 
-/* Brings a column to 13 bits at most, and its prior with it. */
+/* Brings a column to its bits at most, and its prior with it. */
 NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, int32_t prior_q26,
                                       int32_t prior_residual, struct equations *equations) {
   int32_t *column = &room->node[0].column[u];
   int32_t q = fit_tangential_column_q[u];
   uint32_t largest = column_size(column, fixed_size(prior_q26) >> (26 - q));
-  int32_t shift = fixed_bits(largest + (largest >> 8)) - 13;
+  int32_t shift = fixed_bits(largest + (largest >> 8)) - COLUMN_BITS;
   shift = shift < 0 ? 0 : shift; /* fewer bits of a column so small, which is no pad's */
   q -= shift;
   int32_t row = shifted(prior_q26, q - 26);
   int32_t right = row * prior_residual;
   int32_t own = shift_column(column, room->residual, shift, &right) + row * row;
   int32_t scale = (30 - fixed_bits((uint32_t)own)) >> 1;
-  scale = scale > 2 ? 2 : scale;
+  scale = scale > SCALE_MOST ? SCALE_MOST : scale;
   equations->scale[u] = scale;
   equations->column_q[u] = q + scale;
   equations->right_q26[u] = right >> (5 - scale);

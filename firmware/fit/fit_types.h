@@ -14,6 +14,15 @@
 /* Nodes of a rectangle along one axis, at most. */
 #define FIT_GRID_MAX_NODES 6
 
+/* The fixed-point kernels take the rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS sensors that they are compiled for;
+ * with FIT_GRID_ANY instead, as for the host, each call takes that of its array, and gives the same bits more slowly.
+ */
+#ifdef FIT_GRID_ANY
+#define FIT_GRID_MOST_NODES FT_MAX_SENSORS
+#else
+#define FIT_GRID_MOST_NODES (FIT_GRID_COLUMNS * FIT_GRID_ROWS)
+#endif
+
 /* A full rectangle of sensors, for the fixed-point kernels. */
 struct fit_grid_shape {
   uint8_t columns, rows;               /* nodes along x and y, 2..FIT_GRID_MAX_NODES; 0: no grid */

@@ -47,11 +47,10 @@ class Fit(unittest.TestCase):
             found = MEASURE.fit(ARRAY, MEASURE.settings(noise_Pa=5.0, iterations=7), q10(readings_Pa), kernel=kernel)
             self.assertLess(np.quantile(np.hypot(found["x_mm"] - x_mm, found["y_mm"] - y_mm), 0.9), 0.05, kernel)
 
-    def test_the_other_rectangle_has_the_same_fit(self):
-        other = Measure(MEASURE.build, "measure_2x4")
+    def test_another_rectangle_has_the_same_fit(self):
         x_mm, y_mm = np.tile([-4.5, 4.5], 4), np.repeat([-13.5, -4.5, 4.5, 13.5], 2)
         readings = q10(2e4 * np.exp(-((x_mm - 1) ** 2 + (y_mm - 2) ** 2) / 72)[None])
-        found = other.fit(other.array(x_mm, y_mm, 9.0), other.settings(noise_Pa=5.0), readings, kernel="fit_grid")
+        found = MEASURE.fit(MEASURE.array(x_mm, y_mm, 9.0), MEASURE.settings(noise_Pa=5.0), readings, kernel="fit_grid")
         self.assertLess(np.hypot(found["x_mm"] - 1, found["y_mm"] - 2)[0], 0.01)
 
     def test_what_is_wrong_is_refused_before_it_runs(self):
@@ -78,7 +77,7 @@ class Fit(unittest.TestCase):
         with self.assertRaisesRegex(MeasureError, "no such entry point"):
             MEASURE.call("none")
         with self.assertRaisesRegex(MeasureError, "build it"):
-            Measure(MEASURE.build, "none")
+            Measure(MEASURE.build / "none")
 
 
 class Held(unittest.TestCase):

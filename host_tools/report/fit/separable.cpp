@@ -8,7 +8,7 @@
 namespace fingertip::fitting {
 namespace {
 
-constexpr int COLUMNS = FIT_GRID_COLUMNS, ROWS = FIT_GRID_ROWS;
+constexpr int COLUMNS = 3, ROWS = 5;
 // Nodes are numbered from the one in the middle, the later of two.
 constexpr int FIRST_COLUMN = -(COLUMNS / 2), FIRST_ROW = -(ROWS / 2);
 constexpr double MARGIN = 1.5, OVERSHOOT = 0.25; // pitches around the array

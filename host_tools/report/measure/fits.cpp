@@ -1,4 +1,4 @@
-// The firmware's fit on many presses, for the rectangle that this file is compiled for.
+// The firmware's fit on many presses, of any layout.
 #include "libfingertip/in_parallel.hpp"
 #include "report/measure/fit_arguments.hpp"
 #include "report/measure/stopwatch.hpp"

@@ -116,11 +116,9 @@ def usable_of(readings):
 
 
 class Measure(Library):
-    """name: measure, for the firmware's own array, or measure_2x4, for one of two by four sensors."""
-
-    def __init__(self, build, name="measure"):
+    def __init__(self, build):
         self.build = pathlib.Path(build).resolve()
-        super().__init__(self.build / f"measure/lib{name}.so")
+        super().__init__(self.build / "measure/libmeasure.so")
         self.no_own = np.zeros((0, 0), self.records.get("fit_own", "V12"))
 
     @property

@@ -222,7 +222,7 @@ def main(argv):
     firmware = Measure(options.build)
     sources = json.loads(pathlib.Path(options.sources).read_text(encoding="utf-8"))
     here = found_below(options.folder, sources)
-    found, shown = judge_grids(Measure(options.build, "measure_2x4"), sources["grids"], here)
+    found, shown = judge_grids(firmware, sources["grids"], here)
     print("        run times", flush=True)
     judges = [row["recording"] for row in found["grids"] if row["part"] == "judges"]
     found["pace"] = pace.twin_rows(firmware, options.pads) + pace.rows("real", [pad for key in judges for pad in shown[key]["to_pace"]])

@@ -11,7 +11,7 @@
 #include <stdbool.h>
 #include <string.h>
 
-enum { COLUMNS = FIT_GRID_COLUMNS, ROWS = FIT_GRID_ROWS, SENSORS = COLUMNS * ROWS };
+enum { COLUMNS = TEST_COLUMNS, ROWS = TEST_ROWS, SENSORS = COLUMNS * ROWS };
 #define PITCH_mm 9.0f
 #define ALL (UINT32_MAX >> (32 - SENSORS))
 #define WITHOUT(sensor) (ALL & ~(UINT32_C(1) << (sensor)))

@@ -301,14 +301,10 @@ TEST(test_rubber_beyond_the_limits_is_refused) {
   struct pad_profile wrong = rubber.profile;
   wrong.normal[0].share = NAN;
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_shapes_init(&pad, &array, &wrong));
-  struct fit_array turned;
-  float x_mm[SENSORS], y_mm[SENSORS];
-  for (int k = 0; k < SENSORS; k++) { /* five columns of three */
-    x_mm[k] = 9.0f * (float)(k / 3 - 2);
-    y_mm[k] = 9.0f * (float)(k % 3 - 1);
-  }
-  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&turned, SENSORS, x_mm, y_mm, 9.0f));
-  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_shapes_init(&pad, &turned, &rubber.profile));
+  struct fit_array line;
+  const float along_mm[4] = {0, 9, 18, 27};
+  TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&line, 4, along_mm, along_mm, 9.0f));
+  TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_shapes_init(&pad, &line, &rubber.profile));
 }
 
 /* chi^2 + 14 must fall by a quarter. */
@@ -343,7 +339,7 @@ static void assert_limit(int32_t limit, int32_t of_pair) {
 }
 
 TEST(test_more_unknowns_must_explain_more) {
-  static const int32_t unexplained[] = {0, FREEDOM << 8, (4 * FREEDOM) << 8};
+  const int32_t unexplained[] = {0, FREEDOM << 8, (4 * FREEDOM) << 8};
   const int32_t most = 1 << 30; /* chi^2 is no larger */
   set_pair(ONE_Q20 / 2, ONE_Q20 / 2);
   for (int i = 0; i < 3; i++) {

@@ -426,7 +426,7 @@ TEST(test_profiles_that_no_layer_has_are_refused) {
   for (int i = 0; i < 5; i++) {
     TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_pad_init(&pad, &array, &wrong[i]));
   }
-  float x_mm[8] = {0, 9, 18, 27, 0, 9, 18, 27}, y_mm[8] = {0, 0, 0, 0, 9, 9, 9, 9};
+  const float x_mm[8] = {0, 9, 18, 27, 0, 9, 18, 28}, y_mm[8] = {0, 0, 0, 0, 9, 9, 9, 9}; /* one off its node */
   struct fit_array other;
   TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&other, 8, x_mm, y_mm, 9.0f));
   TEST_ASSERT_EQUAL(FT_ERR_ARGUMENT, fit_pad_init(&pad, &other, &good));
