@@ -14,6 +14,9 @@ import tempfile
 import time
 import unittest
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "support"))
+from called import run  # noqa: E402
+
 TOOLS = argparse.Namespace()
 PATIENCE_s = 600
 USE = """#!/bin/sh
@@ -27,13 +30,6 @@ fingertip replay press.csv --to-csv again.csv
 """
 
 
-def run(*command, **options):
-    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=PATIENCE_s, **options)
-    if done.returncode:
-        raise AssertionError(f"{command}: {done.stdout}{done.stderr}")
-    return done.stdout
-
-
 def system(name):
     lines = pathlib.Path("/etc/os-release").read_text().splitlines()
     return dict(line.split("=", 1) for line in lines if "=" in line)[name]
@@ -42,9 +38,7 @@ def system(name):
 class Package(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        holder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        cls.addClassCleanup(holder.cleanup)
-        cls.folder = pathlib.Path(holder.name)
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory(prefix="fingertip-test-")))
         run(TOOLS.cpack, "--config", pathlib.Path(TOOLS.build) / "CPackConfig.cmake", "-B", cls.folder / "packages")
         cls.packages = sorted((cls.folder / "packages").glob("*.deb"))
 
@@ -56,7 +50,7 @@ class Package(unittest.TestCase):
             self.assertEqual(run("dpkg-deb", "--field", package, "Version").strip(), version)
         held = run("dpkg-deb", "--contents", self.packages[0])
         expected = """bin/fingertip lib/udev/rules.d/60-fingertip.rules lib/systemd/user/fingertip.service share/man/man1/fingertip.1.gz
-            share/bash-completion/completions/fingertip"""
+            share/bash-completion/completions/fingertip share/doc/fingertip/mujoco/LICENSES_THIRD_PARTY.md"""
         for path in expected.split():
             self.assertIn(f"./usr/{path}\n", held)
         for path in (pathlib.Path(TOOLS.build) / "host_tools/web/page").rglob("*.*"):  # where it was built
