@@ -70,8 +70,8 @@ std::string xml_of(const KindOfGrasp &grasp) {
   xml.precision(12);
   xml << "<mujoco><option timestep='" << Cell::STEP_s << "' integrator='implicitfast' cone='elliptic' impratio='"
       << IMPRATIO
-      << "'><flag multiccd='enable' island='disable'/></option><default><geom contype='0' conaffinity='0'/><pair "
-         "solref='"
+      << "'><flag multiccd='enable' island='disable' autoreset='disable'/></option><default>"
+         "<geom contype='0' conaffinity='0'/><pair solref='"
       << CONTACT_s
       << " 1' solimp='.95 .99 .0002'/></default><worldbody><geom name='table' type='plane' size='1 1 .1' pos='0 0 "
       << -M * size.z_mm << "'/>"
@@ -114,6 +114,7 @@ struct FreeModel {
 std::unique_ptr<mjModel, FreeModel> compiled(const KindOfGrasp &grasp) {
   static std::mutex one_at_a_time;
   const std::lock_guard lock(one_at_a_time);
+  mju_user_warning = [](const char *) {}; // World::step throws, and no file MUJOCO_LOG.TXT appears
   char why[500] = "";
   mjSpec *spec = mj_parseXMLString(xml_of(grasp).c_str(), nullptr, why, sizeof why);
   std::unique_ptr<mjModel, FreeModel> model(spec ? mj_compile(spec, nullptr) : nullptr);
@@ -282,6 +283,10 @@ struct Cell::World {
     data->xfrc_applied[6 * object + 2] = inputs.push_N.y;
     model->geom_pos[3 * table + 2] = table_m - (inputs.table ? M * inputs.lifted_mm : AWAY_m);
     mj_step(model.get(), data.get());
+    const mjWarningStat *of = data->warning;
+    if (of[mjWARN_BADQPOS].number + of[mjWARN_BADQVEL].number + of[mjWARN_BADQACC].number > 0) {
+      throw std::runtime_error("MuJoCo's object diverged");
+    }
     for (Pad &pad : pads) {
       look(pad);
     }

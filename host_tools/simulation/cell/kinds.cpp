@@ -1,6 +1,7 @@
 #include "simulation/cell/kinds.hpp"
 
 #include "libfingertip/random.hpp"
+#include "libfingertip/text.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -69,7 +70,6 @@ double way_of(double t) {
   t = std::clamp(t, 0.0, 1.0);
   return t * t * t * (10.0 - 15.0 * t + 6.0 * t * t);
 }
-double speed_of(double t) { return t <= 0.0 || t >= 1.0 ? 0.0 : 30.0 * t * t * (1.0 - t) * (1.0 - t); }
 double acceleration_of(double t) { return t <= 0.0 || t >= 1.0 ? 0.0 : 60.0 * t * (1.0 - t) * (1.0 - 2.0 * t); }
 
 double draw(Random &random, const Range &range) { return random.uniform(range.low, range.high); }
@@ -199,10 +199,8 @@ const char *name_of(Kind kind) {
 const char *name_of(Shape shape) { return STIFFER[static_cast<int>(shape)].name; }
 
 Shape shape_of(const std::string &name) {
-  for (const Shape shape : SHAPES) {
-    if (name == name_of(shape)) {
-      return shape;
-    }
+  if (const Shape *found = find_in(SHAPES, [&](Shape shape) { return name == name_of(shape); })) {
+    return *found;
   }
   throw std::runtime_error("there is no shape \"" + name + "\"; choose one of: ball egg box plate upright lying cup");
 }
@@ -213,10 +211,8 @@ const char *name_of(Event::Kind kind) {
 }
 
 Kind kind_of(const std::string &name) {
-  for (const Kind kind : KINDS) {
-    if (name == name_of(kind)) {
-      return kind;
-    }
+  if (const Kind *found = find_in(KINDS, [&](Kind kind) { return name == name_of(kind); })) {
+    return *found;
   }
   throw std::runtime_error("there is no kind \"" + name + "\"; choose one of: gentle usual rough slick fragile");
 }
@@ -225,7 +221,6 @@ KindOfGrasp::Inputs KindOfGrasp::inputs(double t_s) const {
   Inputs inputs;
   inputs.mass_kg = mass_kg;
   inputs.lifted_mm = lift_mm * way_of(t_s / lift_s);
-  inputs.lift_mm_s = lift_mm * speed_of(t_s / lift_s) / lift_s;
   inputs.hand_m_s2.y = 1e-3 * lift_mm * acceleration_of(t_s / lift_s) / (lift_s * lift_s);
   inputs.table = t_s < lift_s;
   for (const Event &event : events) {

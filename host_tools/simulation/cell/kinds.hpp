@@ -100,7 +100,7 @@ struct KindOfGrasp {
   double poll_factor = 1.0;            // how much slower the gripper's line is than its traits
 
   struct Inputs { // external inputs
-    double lifted_mm = 0.0, lift_mm_s = 0.0;
+    double lifted_mm = 0.0;
     Vector hand_m_s2; // y is upwards
     Vector push_N;
     double mass_kg = 0.0, friction_share = 1.0;

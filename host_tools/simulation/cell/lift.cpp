@@ -320,9 +320,10 @@ private:
 } // namespace
 
 void be_of_kind(LiftOptions &options, Kind kind) {
-  const double stiffness_N_mm = options.world.grasp.stiffness_N_mm;
-  options.world.grasp = draw_grasp(kind, options.seed, 0);
-  options.world.grasp.stiffness_N_mm = stiffness_N_mm;
+  KindOfGrasp grasp = draw_grasp(kind, options.seed, 0);
+  grasp.stiffness_N_mm = options.world.grasp.stiffness_N_mm;
+  grasp.down_rad = options.world.grasp.down_rad;
+  options.world.grasp = grasp;
   options.world.kind = kind;
   options.opens_mm = options.world.grasp.opens_mm;
 }

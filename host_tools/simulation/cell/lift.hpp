@@ -20,8 +20,8 @@ struct LiftOptions {
   bool overwrite = false;
 };
 
-// The first grasp of this kind at the options' seed (kinds.hpp), and how far the gripper is open then. Errors and
-// delays of frames are no part of it: the fingertips are the firmware itself.
+// The first grasp of this kind at the options' seed (kinds.hpp), and how far the gripper is open then; gravity and the
+// object's stiffness are the options'. Errors and delays of frames are no part of it: the fingertips are the firmware.
 void be_of_kind(LiftOptions &options, Kind kind);
 
 // Throws Error, bad_value: the gripper does not open so far.

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
+#include <stdexcept>
 
 namespace {
 
@@ -94,6 +95,12 @@ TEST(Cell, FallsFreelyWhereNothingHolds) {
   EXPECT_NEAR(-cell.way_mm().y, 0.5 * 9810.0 * 0.06 * 0.06, 0.15);
   EXPECT_EQ(cell.force_N(0), 0.0);
   EXPECT_TRUE(cell.slips());
+}
+
+TEST(Cell, ThrowsWhenItDiverges) {
+  const KindOfGrasp grasp = held(Shape::ball, 0.2, 0.5);
+  Cell cell(grasp);
+  EXPECT_THROW(run(cell, grasp, 38.0, 0.1, [](double, Inputs &now) { now.push_N.x = 1e30; }), std::runtime_error);
 }
 
 TEST(Cell, SlipsAtFrictionAndNotBefore) {

@@ -102,7 +102,7 @@ TEST(Face, AnAreaIsHeldInByItsOwnWidth) {
   for (std::size_t k = 0; k < SENSORS; k++) {
     most_Pa = std::max(most_Pa, std::abs(face.base_Pa(area)[k] - pressed[k]));
   }
-  EXPECT_LT(most_Pa, 0.3 * pressed[7]); // what an area pulls is hardly felt
+  EXPECT_LT(most_Pa, 0.3 * pressed[7]); // the pull of an area hardly reaches them
 }
 
 } // namespace
