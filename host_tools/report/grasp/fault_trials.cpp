@@ -71,11 +71,18 @@ struct When {
   const char *name;
   std::uint8_t state;
   double after_s, watched_s;
+  std::optional<GripRequest> asked = {};
 };
-constexpr When STATES[] = {{"activate", GRIP_ACTIVATING, 0.3, 7.0}, {"approach", GRIP_APPROACH, 0.05, 3.0},
-                           {"squeeze", GRIP_SQUEEZE, 0.02, 2.5},    {"ready", GRIP_READY, 0.02, 2.5},
-                           {"holding", GRIP_HOLDING, 0.8, 2.0},     {"slipping", GRIP_SLIPPING, 0.0, 2.0},
-                           {"still", GRIP_STILL, 0.05, 2.0},        {"release", GRIP_RELEASE, 0.02, 2.0}};
+constexpr When STATES[] = {{"activate", GRIP_ACTIVATING, 0.3, 7.0},
+                           {"approach", GRIP_APPROACH, 0.05, 3.0},
+                           {"squeeze", GRIP_SQUEEZE, 0.02, 2.5},
+                           {"ready", GRIP_READY, 0.02, 2.5},
+                           {"holding", GRIP_HOLDING, 0.8, 2.0},
+                           {"slipping", GRIP_SLIPPING, 0.0, 2.0},
+                           {"still", GRIP_STILL, 0.05, 2.0, GRIP_REQUEST_HOLD},
+                           {"placing", GRIP_PLACING, 0.05, 2.0, GRIP_REQUEST_PLACE},
+                           {"handing", GRIP_HANDING, 0.05, 2.0, GRIP_REQUEST_HAND_OVER},
+                           {"release", GRIP_RELEASE, 0.02, 2.0, GRIP_REQUEST_RELEASE}};
 
 struct FaultTrial {
   const Thing &thing;
@@ -113,10 +120,8 @@ KindTrial trial_of(const Thing &thing, const std::string &gripper, const When &w
   if (when.state == GRIP_SLIPPING) {
     trial.slick_after_s = 0.6;
   }
-  if (when.state == GRIP_STILL || when.state == GRIP_RELEASE) {
-    trial.asked = when.state == GRIP_STILL ? GRIP_REQUEST_HOLD : GRIP_REQUEST_RELEASE;
-    trial.asked_after_s = 0.8;
-  }
+  trial.asked = when.asked;
+  trial.asked_after_s = 0.8;
   Fault fault;
   fault.kind = happening.kind;
   fault.fingers = {(happening.fingers & 1) != 0, (happening.fingers & 2) != 0};
@@ -125,6 +130,7 @@ KindTrial trial_of(const Thing &thing, const std::string &gripper, const When &w
   fault.after_s = trial.activates && trial.gripper.activation_s == 0.0 ? 0.0 : when.after_s;
   fault.lasts_s = happening.lasts_s;
   fault.watched_s = when.watched_s;
+  fault.is_followed_by_pouring = when.state != GRIP_HANDING; // which pulls
   trial.fault = fault;
   return trial;
 }

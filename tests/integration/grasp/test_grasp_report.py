@@ -30,7 +30,7 @@ else:
     if options["--kind"] == "usual,rough":
         for one in each[: count // 100]:
             one["dropped"] = True
-        # Boxes are held by more than balls, plates by more than that; two of each hundred turn and nobody says so.
+        # Boxes are held by more than balls, plates by more than that; two of each hundred turn unreported.
         for i, one in enumerate(each):
             one["shape"] = ["ball", "box", "plate", "upright", "lying"][i % 5]
             one["margin"] += {"box": 1.0, "plate": 4.0}.get(one["shape"], 0.0)
@@ -51,9 +51,7 @@ print(json.dumps(found))
 
 class Grasp(unittest.TestCase):
     def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.folder = pathlib.Path(temporary.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         self.out = self.folder / "out"
         self.program(PROGRAM)
 
@@ -110,7 +108,7 @@ class Grasp(unittest.TestCase):
     def test_what_is_written_to_read(self):
         self.run_tool("--grasps", "5")
         text = (self.out / "grasp.md").read_text()
-        words = "Simulated rubber/Nothing was checked on hardware/no load reported/## By kind/## Set forces/## Wrong readings/## Faults/both frozen | holding | True"
+        words = "Simulated rubber/Nothing was checked on hardware/no load reported/as a round contact whose load is known/## By kind/## Set forces/## Wrong readings/## Faults/both frozen | holding | True"
         for each in words.split("/"):
             self.assertIn(each, text)
 
