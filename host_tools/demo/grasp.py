@@ -70,7 +70,7 @@ def draw(grip, t_s, truth, truth_s, slips, happened):
     set_style()
     figure, (force, load, slid, width) = plt.subplots(4, 1, sharex=True, figsize=(12, 8), height_ratios=[3, 1.6, 1.3, 1.6])
     figure.subplots_adjust(left=0.065, right=0.985, top=0.9, bottom=0.065, hspace=0.14)
-    controlled = np.isin(grip["state"], ("squeeze", "ready", "holding", "slipping"))
+    controlled = np.isin(grip["state"], ("squeeze", "ready", "holding", "slipping", "placing", "handing"))
     for panel, name in ((force, "force_N"), (load, "load_N"), (slid, "slid_mm"), (width, "width_mm")):
         panel.plot(truth_s, truth[name], color=TRUTH, lw=3.5, label="true force" if panel is force else "truth", zorder=1)
         panel.set_ylabel(name.replace("_", ", "))

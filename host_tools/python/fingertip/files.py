@@ -588,7 +588,7 @@ def read_recording(
 
 
 GRIP_WORDS = ("state", "trouble")  # its columns that are names
-GRIP_STATES = "idle activating approach squeeze ready holding slipping still release open dropped missed fault".split()
+GRIP_STATES = "idle activating approach squeeze ready holding slipping placing handing still release open dropped missed fault".split()
 GRIP_ROW = "# grip: "
 
 

@@ -233,7 +233,7 @@ def draw_grasp(path, grip, fingertips):
     panels = [force, *(figure.add_subplot(grid[i], sharex=force) for i in range(1, 4))]
     _, load, width, state = panels
     t_s = grip["time_us"] / 1e6
-    controlled = np.isin(grip["state"], ("squeeze", "ready", "holding", "slipping"))
+    controlled = np.isin(grip["state"], ("squeeze", "ready", "holding", "slipping", "placing", "handing"))
     for recording, colour, label in zip(fingertips, (MEASURED, ALONG_Y), ("left", "right")):
         rows = recording.has_contact
         measured_s, flags = recording.time_us[rows] / 1e6, recording.flag(FIT_VALID)[rows]
@@ -253,7 +253,8 @@ def draw_grasp(path, grip, fingertips):
         panel.tick_params(labelbottom=False)
     for start, _ in slipping:
         force.axvline(start, color=SLIPPING, lw=1, zorder=1)
-    colours = {"slipping": SLIPPING, "dropped": SLIPPING, "missed": SLIPPING, "fault": SLIPPING, "holding": ALONG_Y, "ready": ALONG_Y}
+    colours = {"slipping": SLIPPING, "dropped": SLIPPING, "missed": SLIPPING, "fault": SLIPPING}
+    colours |= dict.fromkeys(("ready", "holding", "placing", "handing"), ALONG_Y)
     for name in dict.fromkeys(grip["state"]):
         for start, end in spans(t_s, grip["state"] == name):
             state.barh(0.5, end - start, left=start, height=1, color=colours.get(name, TRUTH), ec="white", lw=0.5)

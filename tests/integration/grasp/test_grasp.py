@@ -430,6 +430,9 @@ class Recorded(GraspTest):
         # what is damaged is named, and salvaged
         text = pathlib.Path(self.csv).read_text(encoding="utf-8")
         number = text[: text.index("# grip: ", text.index(",holding,") - 40)].count("\n") + 1
+        for state in ("placing", "handing"):
+            pathlib.Path(self.csv).write_text(text.replace(",holding,", f",{state},", 1), encoding="utf-8")
+            self.assertIn(state, files.read_grip(self.csv)["state"])
         pathlib.Path(self.csv).write_text(text.replace(",holding,", ",hodling,", 1), encoding="utf-8")
         _, err = self.run_cli("replay", self.csv, "--speed", "max", status=1)
         self.assertRegex(err, rf':{number}: state is "hodling"; use --salvage')
