@@ -191,7 +191,13 @@ private:
     request.body = in_.substr(end + 4, *length);
     request.fd = fd_;
     in_.erase(0, whole);
-    return reply(handler(request), headers, request.method == "HEAD", !stays);
+    HttpAnswer found(500, "the server could not answer; it has printed why\n");
+    try {
+      found = handler(request);
+    } catch (const std::exception &error) {
+      std::fprintf(stderr, "fingertip: %s: %s\n", printable(request.path).c_str(), printable(error.what()).c_str());
+    }
+    return reply(std::move(found), headers, request.method == "HEAD", !stays);
   }
 
   bool reply(HttpAnswer answer, const std::string &headers, bool only_head, bool ends) {
@@ -217,6 +223,7 @@ private:
         return (errno == EAGAIN || errno == EINTR) && host_now() < until_;
       }
       sent_ += static_cast<std::size_t>(count);
+      until_ = host_now() + (stream_ ? TO_TAKE_SOME : TO_TAKE);
     }
     out_.clear();
     file_ = nullptr;
@@ -254,8 +261,8 @@ HttpServer::HttpServer(const std::string &address, unsigned port, std::string he
   sockaddr_storage bound = {};
   socklen_t length = sizeof bound;
   listening_ = socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  setsockopt(listening_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  if (listening_ < 0 || bind(listening_, found->ai_addr, found->ai_addrlen) != 0 || listen(listening_, BACKLOG) != 0 ||
+  if (listening_ < 0 || setsockopt(listening_, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) != 0 ||
+      bind(listening_, found->ai_addr, found->ai_addrlen) != 0 || listen(listening_, BACKLOG) != 0 ||
       getsockname(listening_, reinterpret_cast<sockaddr *>(&bound), &length) != 0) {
     const int error = errno;
     close(listening_);

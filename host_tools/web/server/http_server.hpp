@@ -2,11 +2,12 @@
  *
  *   a request      HEAD_BYTES of head, BODY_BYTES of body, of a length that it states; 10 s from its first byte
  *   connections    MOST_CONNECTIONS, MOST_OF_A_PEER from one address; one more takes the place of
- *                  the oldest that waits for a request, else for an answer, so that silent ones keep nobody out
- *   an answer      60 s; one without end (Stream) lasts as long as its reader takes something within 10 s
+ *                  the oldest that waits for a request, else for an answer, so that silent ones keep no one out
+ *   an answer      as long as its reader takes something within 60 s; within 10 s of one without end (Stream)
  *
  * Memory: at most MOST_CONNECTIONS * (HEAD_BYTES + BODY_BYTES) = 21 MB, files apart, which are sent from where they
- * are. A fault of a request is answered (400, 411, 413, 431, 505) and its connection ends. */
+ * are. A fault of a request is answered (400, 411, 413, 431, 505) and its connection ends. An exception of the handler
+ * is answered (500) and printed. */
 #pragma once
 
 #include "libfingertip/clock.hpp"

@@ -5,8 +5,8 @@
  * localhost: a name of the asker's own that leads here (DNS rebinding) is refused with 421.
  *
  * Everyone on this machine may read the page. Simulated fingertips are given to who has the token, which each server
- * makes anew: as a parameter of the request, or as the cookie that the page gets with it. Other users may see it where
- * a browser is started with it, so they are refused even then.
+ * makes at its start: as a parameter of the request, or as the cookie that the page gets with it. Other users may see
+ * it where a browser is started with it, so they are refused even then.
  *
  * Memory: the page's, some megabytes, and what http_server.hpp allows its clients. Errors: Error, of a folder that
  * cannot be read and an address that cannot be had. */

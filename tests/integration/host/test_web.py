@@ -131,16 +131,22 @@ class Web(WebCase):
             for name in (f"localhost:{self.port}", "localhost", f"127.0.0.1:{self.port}", f"[::1]:{self.port}"):
                 self.assertEqual(self.ask(Host=name)[0], 200, name)
 
-    def test_only_this_machine_reaches_it_unless_told(self):
+    def test_only_this_machine_reaches_it_unless_asked(self):
         with self.served() as process:
             listening = subprocess.run(["cat", f"/proc/{process.pid}/net/tcp"], capture_output=True, text=True, timeout=PATIENCE_s).stdout
             self.assertRegex(listening, rf"0100007F:{self.port:04X} 00000000:0000 0A")
         with self.served("--address", "0.0.0.0"):
             self.assertEqual(self.ask("/simulated")[0], 404)  # passes nothing on
         self.assertIn("everyone who reaches 0.0.0.0", self.said)
-        for address in ("127.0.0.2", *["::1"] * bool(pathlib.Path("/proc/net/if_inet6").read_text())):
+        for address in ("127.0.0.2", *["::1"] * self.has_ipv6()):
             with self.served("--address", address):
                 self.assertEqual(self.ask()[0], 200)
+
+    @staticmethod
+    def has_ipv6():
+        with contextlib.suppress(OSError), socket.create_server(("::1", 0), family=socket.AF_INET6):
+            return True
+        return False
 
     def refused(self, *options):
         done = subprocess.run([self.tool, "web", *options], capture_output=True, text=True, timeout=PATIENCE_s)
@@ -164,7 +170,7 @@ class Web(WebCase):
         self.assertIn("the page is not built", said)
         self.assertIn("sh cmake/bootstrap.sh web", said)
 
-    def test_a_page_of_another_version_is_told(self):
+    def test_a_page_of_another_version_is_reported(self):
         mark = '<meta name="fingertip-version" content="{}">'
         for head, of in ((mark.format(__version__), ""), (mark.format("9.8.7"), "version 9.8.7"), ("<meta>", "an unknown version")):
             (self.page / "index.html").write_text(f"<html><head>{head}</head></html>")
@@ -207,6 +213,7 @@ class Web(WebCase):
                 (b"", bytes(1 << 20), b"431"),
             ):
                 self.assertIn(self.attack(head, piece, 300)[9:12], (status, b""), head)
+                self.assertEqual(self.attack(head, piece[:20000], 1)[9:12], status, head)
             for ask in (b"", b"GET /", b"GET /assets/pad.bin HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 3):
                 for _ in range(300):
                     many.enter_context(socket.create_connection((self.host, self.port))).sendall(ask)
@@ -220,7 +227,7 @@ class Web(WebCase):
 
 
 class SimulationsCase(WebCase):
-    def told(self, path, body=None, **headers):
+    def answered(self, path, body=None, **headers):
         """Status and text; a POST if there is a body."""
         status, _, text = self.ask(path, "GET" if body is None else "POST", body, **headers)
         return status, text.decode()
@@ -239,7 +246,7 @@ class SimulationsCase(WebCase):
     def hand(self, command="", client=ONE):
         """What is true then, once anything is known."""
         while True:
-            status, body = self.told(f"/simulated/hand?client={client}", command)
+            status, body = self.answered(f"/simulated/hand?client={client}", command)
             self.assertEqual(status, 200, body)
             if body != "{}":
                 return json.loads(body)
@@ -253,9 +260,11 @@ class SimulationsCase(WebCase):
 class Hand(SimulationsCase):
     def test_it_presses_and_the_truth_follows(self):
         with self.served():
-            self.assertEqual(self.told("/simulated"), (200, "[]"))
+            self.assertEqual(self.answered("/simulated"), (200, "[]"))
             with self.run_tool("simulate", "--mouse", "--fingertips", "2"):
-                self.assertEqual(json.loads(self.told("/simulated")[1]), [{"serial": LEFT, "hand": True}, {"serial": RIGHT, "hand": True}])
+                self.assertEqual(
+                    json.loads(self.answered("/simulated")[1]), [{"serial": LEFT, "hand": True}, {"serial": RIGHT, "hand": True}]
+                )
                 with self.line(), self.line(OTHER, RIGHT):
                     self.hand("press 3 -5.5 2")
                     self.until(lambda: self.hand()["force_N"] > 1.99)
@@ -274,21 +283,21 @@ class Hand(SimulationsCase):
                 self.hand("press 0 0 3")
                 self.until(lambda: self.hand(client=OTHER)["force_N"] > 2.9)
             self.until(lambda: self.hand(client=OTHER)["force_N"] == 0)
-            self.assertEqual(self.told(f"/simulated/hand?client={ONE}", "lift")[0], 404)
+            self.assertEqual(self.answered(f"/simulated/hand?client={ONE}", "lift")[0], 404)
 
     def test_what_it_cannot_do_is_said(self):
         with self.served(), self.run_tool("simulate", "--mouse"), self.line():
             for words in ("press 1 2", "press 1 2 x", "press 1 2 3 4", "push 1 2 3", "lift left", "press 1 2 3\nlift", "press nan 0 1"):
-                status, said = self.told(f"/simulated/hand?client={ONE}", words)
+                status, said = self.answered(f"/simulated/hand?client={ONE}", words)
                 self.assertEqual((status, said), (400, "give press X_mm Y_mm FORCE_N, lift, or nothing\n"), words)
 
     def test_a_simulation_without_a_hand(self):
         with self.served(), self.run_tool("simulate"), self.line():
-            self.assertEqual(json.loads(self.told("/simulated")[1]), [{"serial": LEFT, "hand": False}])
+            self.assertEqual(json.loads(self.answered("/simulated")[1]), [{"serial": LEFT, "hand": False}])
             self.until(lambda: self.hand()["force_N"] > 2)  # its weight
             # The simulation refuses in its own time: the answer to this press may have it, or one of those to the next.
             without = 409, "no hand presses here; start fingertip simulate --mouse\n"
-            self.until(lambda: self.told(f"/simulated/hand?client={ONE}", "press 0 0 1") == without)
+            self.until(lambda: self.answered(f"/simulated/hand?client={ONE}", "press 0 0 1") == without)
 
 
 class Lift(SimulationsCase):
@@ -315,7 +324,7 @@ class Line(SimulationsCase):
     def test_it_is_a_line_to_the_fingertip(self):
         with self.served(), self.run_tool("simulate"):
             with self.line() as line:
-                status, said = self.told(f"/simulated/line?client={ONE}", wire.encode(wire.Packet(7, 0, AskInfo())))
+                status, said = self.answered(f"/simulated/line?client={ONE}", wire.encode(wire.Packet(7, 0, AskInfo())))
                 self.assertEqual((status, said), (200, ""))
                 came = b""
                 while b"native" not in came:  # the name of its board
@@ -329,7 +338,7 @@ class Line(SimulationsCase):
                 answer = connection.getresponse()
             answer.read()  # to its end
             connection.close()
-            self.assertEqual(self.told("/simulated"), (200, "[]"))
+            self.assertEqual(self.answered("/simulated"), (200, "[]"))
 
 
 class Strangers(SimulationsCase):
@@ -349,9 +358,9 @@ class Strangers(SimulationsCase):
                     (f"/simulated/hand?client={ONE}", "press 0 0 9"),
                     (f"/simulated/line?client={ONE}", "x"),
                 ):
-                    self.assertEqual(self.told(path, body, **headers)[0], 403, (path, headers))
-            self.assertEqual(self.told("/simulated", Host="evil.example")[0], 421)
-            self.assertEqual(self.told("/simulated", Origin=here, Sec_Fetch_Site="same-origin")[0], 200)
+                    self.assertEqual(self.answered(path, body, **headers)[0], 403, (path, headers))
+            self.assertEqual(self.answered("/simulated", Host="evil.example")[0], 421)
+            self.assertEqual(self.answered("/simulated", Origin=here, Sec_Fetch_Site="same-origin")[0], 200)
             self.assertEqual(self.hand()["force_N"], 0)
 
     def test_only_who_has_the_token_may_ask(self):
@@ -359,17 +368,17 @@ class Strangers(SimulationsCase):
             cookie = self.ask(f"/?token={self.token}")[1]["Set-Cookie"]
             self.assertEqual(cookie, f"fingertip-{self.port}={self.token}; Path=/simulated; HttpOnly; SameSite=Strict")
             self.assertNotIn("Set-Cookie", self.ask("/?token=0")[1])
-            self.assertEqual(self.told("/simulated", Cookie=cookie)[0], 200)
+            self.assertEqual(self.answered("/simulated", Cookie=cookie)[0], 200)
             for wrong in ("", f"fingertip-{self.port}=0", f"fingertip={self.token}"):
-                self.assertIn("open the address", self.told("/simulated", Cookie=wrong)[1])
+                self.assertIn("open the address", self.answered("/simulated", Cookie=wrong)[1])
 
     @unittest.skipUnless(os.geteuid() == 0, "only root becomes another user")
     def test_another_user_may_not_even_with_the_token(self):
         ask = f"import http.client as h; c = h.HTTPConnection('{{}}', {{}}); c.request('GET', '/simulated?token={{}}'); print(c.getresponse().status)"
         with self.served():
             words = [sys.executable, "-c", ask.format(self.host, self.port, self.token)]
-            told = [subprocess.run(words, capture_output=True, text=True, check=True, user=user).stdout for user in (0, 65534)]
-        self.assertEqual(told, ["200\n", "403\n"])
+            answers = [subprocess.run(words, capture_output=True, text=True, check=True, user=user).stdout for user in (0, 65534)]
+        self.assertEqual(answers, ["200\n", "403\n"])
 
     def test_what_is_wrong_is_said(self):
         with self.served(), self.run_tool("simulate"), self.line():
@@ -383,10 +392,10 @@ class Strangers(SimulationsCase):
                 (f"/simulated/line?client={ONE}", "x" * 5000, 400, "more than"),
                 ("/simulated/more", None, 404, ""),
             ):
-                found, said = self.told(path, body)
+                found, said = self.answered(path, body)
                 self.assertEqual(found, status, (path, said))
                 self.assertIn(words, said)
-            self.assertEqual(self.told(f"/simulated/line?client={ONE}", "x" * 100000)[0], 413)
+            self.assertEqual(self.answered(f"/simulated/line?client={ONE}", "x" * 100000)[0], 413)
 
 
 if __name__ == "__main__":
