@@ -32,8 +32,7 @@ def main(argv):
         name, equals, path = text.partition("=")
         if not equals:
             raise InputError(f"{text} is no NAME=SUMMARY.json")
-        with open(path, encoding="utf-8") as file:
-            summaries[name] = json.load(file)
+        summaries[name] = json.loads(pathlib.Path(path).read_text(encoding="utf-8"))
     table = [
         ("what the fingertip measured, against the truth", list(summaries)),
         *((label, [value(summary) for summary in summaries.values()]) for label, value in ROWS),

@@ -64,9 +64,7 @@ def cost_at(these, best, dx_mm=0.0, dy_mm=0.0):
 
 class Optimum(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.cache = pathlib.Path(folder.name)
+        self.cache = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
 
     def load(self, set_, mask, count):
         return presses.load(MEASURE, COMPARED, set_, mask, SEED, count, self.cache)

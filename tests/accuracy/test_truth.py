@@ -128,9 +128,7 @@ def judged(pads, recordings):
 class TruthGate(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.temporary = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.temporary.cleanup)
-        folder = pathlib.Path(cls.temporary.name)
+        folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         write_recording(folder / "test_good.csv", 2.4)
         write_recording(folder / "other.csv", 2.1, seed=2)
         write_recording(folder / "stays.csv", 2.2, stays_Pa=3000, seed=3)

@@ -13,9 +13,7 @@ import analyse  # noqa: E402
 
 class Analyse(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         shutil.copy(analyse.ROOT / ".clang-tidy", self.folder)
 
     def unit(self, text, on_chip=False):

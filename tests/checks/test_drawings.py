@@ -116,9 +116,7 @@ class Pad(unittest.TestCase):
 
 class Tree(unittest.TestCase):
     def setUp(self):
-        holder = tempfile.TemporaryDirectory()
-        self.addCleanup(holder.cleanup)
-        self.tree = pathlib.Path(holder.name)
+        self.tree = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         for folder in ("boards", "firmware"):
             shutil.copytree(ROOT / folder, self.tree / folder)
 

@@ -42,9 +42,7 @@ NEW_FIELD = '  { name = "torque_N_mm", type = "f32", when = "flags.TANGENTIAL_VA
 
 class Generator(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.root = pathlib.Path(folder.name)
+        self.root = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         for name in (*line.FILES, PAGE, "firmware/wire/line.toml"):
             (self.root / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, self.root / name)

@@ -27,9 +27,7 @@ CHECKSUM = ROOT / "cmake" / "boot2_checksum.py"
 
 class Folder(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
 
     def write(self, path, text, mode=0o644):
         file = self.folder / path

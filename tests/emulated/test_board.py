@@ -38,9 +38,7 @@ def run(*command, check=True):
 class ThirdBoard(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        holder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(holder.cleanup)
-        cls.tree = pathlib.Path(holder.name) / "tree"
+        cls.tree = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory())) / "tree"
         shutil.copytree(ROOT, cls.tree, symlinks=True, ignore=shutil.ignore_patterns("build", "node_modules", ".git"))
         emulator = "host_tools/simulation/emulator"
         (cls.tree / emulator / "node_modules").symlink_to(ROOT / emulator / "node_modules")

@@ -49,9 +49,7 @@ class Board:
 
     @classmethod
     def setUpClass(cls):
-        holder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(holder.cleanup)
-        cls.folder = pathlib.Path(holder.name)
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         cls.truth = Truth(make_scenario(cls.folder / "ideal.csv", "ideal", 12))
 
     @classmethod

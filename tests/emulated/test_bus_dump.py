@@ -133,11 +133,10 @@ def measure(sda, scl, rise_ns):
 class BusDump(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.dump = pathlib.Path(cls.folder.name) / "bus.vcd"
+        folder = cls.enterClassContext(tempfile.TemporaryDirectory())
+        cls.dump = pathlib.Path(folder) / "bus.vcd"
         cls.rise_ns = RISE_ns if TOOLS.board == "pico_parallel" else None
-        cls.done, cls.report, cls.log = run(cls.folder.name, cls.rise_ns)
+        cls.done, cls.report, cls.log = run(folder, cls.rise_ns)
         cls.signals = read_vcd(cls.dump)
         cls.pairs = [(name, "SCL") for name in cls.signals if name != "SCL"]
 

@@ -26,9 +26,7 @@ FORCE_N = 3.0
 class Calibrate(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        temporary = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(temporary.cleanup)
-        cls.folder = pathlib.Path(temporary.name)
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         cls.scenario = cls.folder / "placements.csv"
         twin = [f"{OPTIONS.build}/host_tools/simulation/twin/twin", "scenario", "placements", "-o", cls.scenario]
         pad = options(gain=10, seed=41, pad=7, cache=f"{OPTIONS.build}/contact_tables")

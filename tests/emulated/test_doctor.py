@@ -22,9 +22,7 @@ BOARDS = ("pico_mux", "pico_parallel")
 class Doctor(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        holder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(holder.cleanup)
-        cls.folder = pathlib.Path(holder.name)
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         cls.at_rest = write_scenario(cls.folder / "rest.csv")
         # a system with the rule
         rules = cls.folder / "with_rule/etc/udev/rules.d"

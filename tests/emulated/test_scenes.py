@@ -44,9 +44,8 @@ class SceneRun(Run):
 class Scenes(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.folder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.folder.cleanup)
-        cls.raw, cls.press = SceneRun(cls.folder.name, "raw", "raw"), SceneRun(cls.folder.name, "press", "contact")
+        cls.folder = cls.enterClassContext(tempfile.TemporaryDirectory())
+        cls.raw, cls.press = SceneRun(cls.folder, "raw", "raw"), SceneRun(cls.folder, "press", "contact")
 
     def test_raw_streams_readings_and_nothing_of_a_fit(self):
         self.assertEqual(self.raw.recording.metadata["scene"], "raw")
@@ -70,7 +69,7 @@ class Scenes(unittest.TestCase):
     def at_the_fastest(self, scene):
         """With a pad's profile, if it takes one: the recording, and which of its rows are of the last 0.9 s."""
         extra = [(0.455, "--sequence", "6", "osr", "256"), (0.5, "--sequence", "7", "pad", "12", "0")]
-        run = SceneRun(self.folder.name, scene, "contact", extra)
+        run = SceneRun(self.folder, scene, "contact", extra)
         self.assertEqual({name: run.acks[name] for name in ("6", "7")}, {"6": "0", "7": UNKNOWN_COMMAND if scene == "slip" else "0"})
         recording = run.recording
         self.assertEqual(recording.metadata["scene"], scene)

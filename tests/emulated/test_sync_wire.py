@@ -74,9 +74,7 @@ def worst_us(emulators, recordings, from_s=-np.inf, to_s=np.inf):
 class OneWire(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        holder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(holder.cleanup)
-        folder = pathlib.Path(holder.name)
+        folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         write_scenario(folder / "scenario.csv")
         cls.file = folder / "both.csv"
         with World(TOOLS.support, TOOLS.node, folder) as world:

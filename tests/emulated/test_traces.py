@@ -20,9 +20,7 @@ LEAST_ns = {"low": 1300, "high": 600, "period": 2500}
 
 class Traces(unittest.TestCase):
     def setUp(self):
-        holder = tempfile.TemporaryDirectory()
-        self.addCleanup(holder.cleanup)
-        self.folder = pathlib.Path(holder.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
 
     def test_both_boards_are_drawn(self):
         for board in ("pico_mux", "pico_parallel"):

@@ -29,9 +29,7 @@ sys.exit(77)
 
 class FuzzTest(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.build = pathlib.Path(folder.name)
+        self.build = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         (self.build / "tests/fuzz").mkdir(parents=True)
 
     def target(self, name, more="", options="max_len = 100"):

@@ -178,9 +178,7 @@ def packaged_tool(folder):
 class Linux(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        holder = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(holder.cleanup)
-        cls.folder = pathlib.Path(holder.name)
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         cls.scenario = cls.folder / "scenario.csv"
         write_press(cls.scenario)
         cls.sockets = [cls.folder / f"usb{number}.sock" for number in range(2)]

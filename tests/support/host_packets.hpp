@@ -4,6 +4,8 @@
 #include "libfingertip/wire.hpp"
 
 #include <cstring>
+#include <fstream>
+#include <sstream>
 #include <string>
 #include <unistd.h>
 #include <vector>
@@ -170,5 +172,11 @@ public:
 private:
   std::string path_;
 };
+
+inline std::string contents(const std::string &path) {
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return text.str();
+}
 
 } // namespace test

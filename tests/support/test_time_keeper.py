@@ -13,8 +13,7 @@ SIMULATED_DEVICE, TIME_KEEPER = (os.path.abspath(path) for path in sys.argv[1:3]
 class TimeKeeper(unittest.TestCase):
     def setUp(self):
         self.folder = self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-"))
-        self.world = SimulatedTime(TIME_KEEPER, self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-time-")))
-        self.addCleanup(self.world.close)
+        self.world = self.enterContext(SimulatedTime(TIME_KEEPER, self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-time-"))))
         self.port = os.path.join(self.folder, "tty")
 
     def device(self, *options):

@@ -3,16 +3,10 @@
 import itertools
 import json
 import pathlib
-import subprocess
+
+from called import run
 
 PLAY = pathlib.Path(__file__).resolve().parents[2] / "host_tools/web/wasm/play.mjs"
-
-
-def run(*command):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise AssertionError(f"{command}: {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 def compared(line, other):

@@ -19,10 +19,11 @@ import unittest
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/web")]
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/web"), str(ROOT / "tests/support")]
 import driven  # noqa: E402
 import pictures  # noqa: E402
 from browser import Browser, CannotRun  # noqa: E402
+from called import run  # noqa: E402
 from fingertip import files  # noqa: E402
 from fingertips import Bench  # noqa: E402
 
@@ -48,13 +49,6 @@ TEN_TIMES = "const now_ms = performance.now.bind(performance); performance.now =
 PATIENT = {"tries": PATIENCE_s} | {f"{name}_ms": 1000 * PATIENCE_s for name in ("version", "frame", "slow_frame", "tared", "back")}
 SILENCE = PATIENT | {"tries": 1}  # where no answer is what is to come
 NO_SAVE_DIALOG = "delete window.showSaveFilePicker; delete window.showOpenFilePicker;"
-
-
-def run(*call):
-    done = subprocess.run([str(part) for part in call], capture_output=True, text=True, timeout=PATIENCE_s)
-    if done.returncode:
-        raise AssertionError(f"{call}: {done.stdout}{done.stderr}")
-    return done.stdout
 
 
 class PageTest(unittest.TestCase):

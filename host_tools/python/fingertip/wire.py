@@ -278,9 +278,7 @@ class Decoder:
         self.other_version = 0
         self.listener: Callable[[Packet | None, bytes], None] | None = None
         """Called with each packet and its frame, without the delimiter; nothing: the line was interrupted, and begins again."""
-        self._rest = b""
-        self._joining = True
-        self._expected = -1
+        self.restart()
 
     def restart(self) -> None:
         """The line was interrupted: join again, and expect no particular sequence number."""

@@ -17,11 +17,6 @@ AMBIENT_Pa, FRICTION = 101325.0, 0.5  # of the twin; of the contacts
 WAITED = 1.05  # of the longest conversion: what the firmware waits
 
 
-def terms_of(field):
-    """[(share or moment_mm, sd_mm)]: a sum of Gaussians of a pad_profile."""
-    return field.view(np.float32).reshape(-1, 2).astype(float)
-
-
 def with_tangential(touch, tangential_N, direction, held=True):
     for name, share in zip(FORCE_N, (np.cos(direction), np.sin(direction))):
         touch[name] = tangential_N * share

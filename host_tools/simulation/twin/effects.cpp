@@ -46,14 +46,11 @@ const char GRIDS[] = "recordings of real arrays of eight MS5837 under DragonSkin
 enum Stream : std::uint64_t { GAIN = 101, DRIFT, RELAXATION, AFTEREFFECT, BRANCH, SEAT, MEMORY };
 
 const Effect &effect(const std::string &name) {
-  std::string names;
-  for (const Effect &one : effects()) {
-    if (one.name == name) {
-      return one;
-    }
-    names += (names.empty() ? "" : ", ") + one.name;
+  if (const Effect *found = find_in(effects(), [&](const Effect &one) { return one.name == name; })) {
+    return *found;
   }
-  throw Error("there is no effect \"" + printable(name) + "\"; give some of: " + names + "; or all or none");
+  throw Error("there is no effect \"" + printable(name) + "\"; give some of: " +
+              joined(effects(), ", ", [](const Effect &one) { return one.name; }) + "; or all or none");
 }
 
 // What has followed a ramp of RAMP_s to 1 with the time constant tau, after a hold of `hold_s`.

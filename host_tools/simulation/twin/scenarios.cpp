@@ -311,14 +311,11 @@ const std::vector<ScenarioKind> &scenario_kinds() {
 }
 
 const ScenarioKind &scenario_kind(const std::string &name) {
-  std::string names;
-  for (const ScenarioKind &one : scenario_kinds()) {
-    if (one.name == name) {
-      return one;
-    }
-    names += (names.empty() ? "" : ", ") + one.name;
+  if (const ScenarioKind *found = find_in(scenario_kinds(), [&](const auto &one) { return one.name == name; })) {
+    return *found;
   }
-  throw Error("there is no kind of scenario \"" + printable(name) + "\"; give one of: " + names);
+  throw Error("there is no kind of scenario \"" + printable(name) +
+              "\"; give one of: " + joined(scenario_kinds(), ", ", [](const ScenarioKind &one) { return one.name; }));
 }
 
 Forces::Forces(const std::string &text) {

@@ -147,7 +147,7 @@ bool measures_nothing(const Array &array, const std::vector<Placement> &placemen
   return expected > LOADED_SHARE * others.peak_Pa * LOADED_SHARE * others.peak_Pa && measured < MEASURED_MIN * expected;
 }
 
-/* What it has of the pad, with readings as uncertain as gains may be that nobody knows. */
+/* What it has of the pad, with readings as uncertain as unknown gains make them. */
 Solution in_part(Solution solution, bool gains) {
   solution.gain_sd.assign(solution.gain.size(), Assumptions{}.gain);
   solution.reading_sd.assign(solution.gain.size(), PART_SD);

@@ -19,11 +19,8 @@ from simulated_time import SimulatedTime  # noqa: E402
 
 class Tool(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
-        self.addCleanup(folder.cleanup)
-        self.folder = folder.name
-        self.world = SimulatedTime(TIME_KEEPER, self.folder)
-        self.addCleanup(self.world.close)
+        self.folder = self.enterContext(tempfile.TemporaryDirectory(prefix="fingertip-test-"))
+        self.world = self.enterContext(SimulatedTime(TIME_KEEPER, self.folder))
 
     @contextlib.contextmanager
     def simulated(self, *options):

@@ -13,30 +13,18 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "host_tools/python"))
+sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
+from called import run as must  # noqa: E402
 from fingertip import files  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 PYTHON = ROOT / "host_tools/python"
 
 
-def run(*command):
-    return subprocess.run([str(word) for word in command], capture_output=True, text=True)
-
-
-def must(*command):
-    done = run(*command)
-    if done.returncode != 0:
-        raise AssertionError(f"{command}: {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
-
-
 class Player(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.temporary = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.temporary.cleanup)
-        cls.folder = pathlib.Path(cls.temporary.name)
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         cls.scenario = cls.folder / "demo.csv"
         must(sys.executable, PYTHON, "scenario", "demo", "-o", cls.scenario)
 
@@ -52,7 +40,7 @@ class Player(unittest.TestCase):
         return json.loads(summary.read_text())
 
     def refused(self, *arguments):
-        done = run(OPTIONS.player, *arguments)
+        done = subprocess.run([OPTIONS.player, *map(str, arguments)], capture_output=True, text=True)
         self.assertNotEqual(done.returncode, 0)
         self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
         return done.stderr

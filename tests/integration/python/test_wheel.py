@@ -14,17 +14,11 @@ import zipfile
 FAKE_DEVICE = os.path.abspath(sys.argv[1])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tests/support"))
+from called import run  # noqa: E402
 from real_time import plugged_in  # noqa: E402
 
 PACKAGE = ROOT / "host_tools/python"
 PATIENCE_s = 300
-
-
-def run(*call, **options):
-    done = subprocess.run(list(map(str, call)), capture_output=True, text=True, timeout=PATIENCE_s, **options)
-    if done.returncode != 0:
-        raise AssertionError(f"{call}: {done.stdout}{done.stderr}")
-    return done.stdout
 
 
 class Distribution(unittest.TestCase):

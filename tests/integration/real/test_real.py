@@ -39,9 +39,7 @@ def write_grid(path, gains=(1.0,) * 8):
 
 class Real(unittest.TestCase):
     def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.folder = pathlib.Path(temporary.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
         (self.folder / "data/below").mkdir(parents=True)
         self.grid = self.folder / "data/below/grid.csv"
         write_grid(self.grid)

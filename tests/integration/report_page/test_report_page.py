@@ -117,9 +117,7 @@ def names_in(value):
 
 class Page(unittest.TestCase):
     def setUp(self):
-        temporary = tempfile.TemporaryDirectory()
-        self.addCleanup(temporary.cleanup)
-        self.folder = pathlib.Path(temporary.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
 
     def write(self, name, found):
         (self.folder / f"{name}.json").write_text(json.dumps(found))

@@ -30,9 +30,7 @@ console.log(JSON.stringify({ metadata: s.metadata, rows: s.times_s.length, end_s
 
 class TwinTest(unittest.TestCase):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="twin-test-")
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory(prefix="twin-test-")))
         self.csv = str(self.folder / "played.csv")
 
     def run_twin(self, *arguments, status=0, **options):

@@ -18,7 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 import wasm_parity  # noqa: E402
-from wasm_parity import run as must  # noqa: E402
+from called import run as must  # noqa: E402
 
 OPTIONS = argparse.Namespace()
 STORED_PAD = 1 << 4  # wire_stored
@@ -27,9 +27,7 @@ STORED_PAD = 1 << 4  # wire_stored
 class WebWasm(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.temporary = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(cls.temporary.cleanup)
-        cls.folder = pathlib.Path(cls.temporary.name)
+        cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         cls.build = pathlib.Path(OPTIONS.build)
         cls.web = cls.build / "host_tools/web/wasm"
 

@@ -4,10 +4,8 @@
 
 #include <csignal>
 #include <filesystem>
-#include <fstream>
 #include <gtest/gtest.h>
 #include <optional>
-#include <sstream>
 #include <sys/resource.h>
 #include <sys/stat.h>
 
@@ -17,13 +15,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr auto WHEN_FINISHED = OutputFile::Appears::when_finished;
-
-std::string contents(const std::string &path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 void write(const std::string &path, const std::string &text) { std::ofstream(path, std::ios::binary) << text; }
 
@@ -49,9 +40,9 @@ TEST(OutputFile, AnUnfinishedOneLeavesTheOldFile) {
   {
     OutputFile file(folder / "a", true, WHEN_FINISHED);
     file.append("new", 3);
-    EXPECT_EQ(contents(folder / "a"), "old");
+    EXPECT_EQ(test::contents(folder / "a"), "old");
   }
-  EXPECT_EQ(contents(folder / "a"), "old");
+  EXPECT_EQ(test::contents(folder / "a"), "old");
   EXPECT_EQ(files_in(folder.path()), 1);
 }
 
@@ -66,7 +57,7 @@ TEST(OutputFile, AFinishedOneTakesThePlaceAndThePermissionsOfTheOld) {
     file.finish();
   }
   EXPECT_TRUE(fs::is_symlink(folder / "link"));
-  EXPECT_EQ(contents(folder / "a"), "new");
+  EXPECT_EQ(test::contents(folder / "a"), "new");
   EXPECT_EQ(fs::status(folder / "a").permissions(), fs::perms(0640));
   EXPECT_EQ(files_in(folder.path()), 2);
 }
@@ -77,7 +68,7 @@ TEST(OutputFile, AFileThatCameMeanwhileIsKept) {
   file.append("new", 3);
   write(folder / "a", "other");
   EXPECT_THROW(file.finish(), Error);
-  EXPECT_EQ(contents(folder / "a"), "other");
+  EXPECT_EQ(test::contents(folder / "a"), "other");
 }
 
 TEST(OutputFile, WhatCannotBeWrittenIsRefusedAndTouchesNothing) {
@@ -90,7 +81,7 @@ TEST(OutputFile, WhatCannotBeWrittenIsRefusedAndTouchesNothing) {
   for (bool replace : {false, true}) {
     EXPECT_EQ(refusal(folder.path(), replace), ErrorCode::is_folder);
   }
-  EXPECT_EQ(contents(folder / "a"), "old");
+  EXPECT_EQ(test::contents(folder / "a"), "old");
   EXPECT_EQ(files_in(folder.path()), 1);
 }
 

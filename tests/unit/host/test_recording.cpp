@@ -5,7 +5,6 @@
 #include "support/pad.h"
 
 #include <algorithm>
-#include <fstream>
 #include <functional>
 #include <gtest/gtest.h>
 #include <sstream>
@@ -13,13 +12,6 @@
 using namespace fingertip;
 
 namespace {
-
-std::string contents(const std::string &path) {
-  std::ifstream file(path, std::ios::binary);
-  std::ostringstream text;
-  text << file.rdbuf();
-  return text.str();
-}
 
 using Frames = std::vector<std::vector<std::uint8_t>>;
 
@@ -58,7 +50,7 @@ struct Recorded {
       writer.finish({LineStatistics()}, "test");
     }
   }
-  bool has(const std::string &text) const { return contents(path).find(text) != std::string::npos; }
+  bool has(const std::string &text) const { return test::contents(path).find(text) != std::string::npos; }
   void write(const std::string &text) const { std::ofstream(path, std::ios::binary) << text; }
   Frames frames() const {
     RecordingReader reader(path, false);
@@ -76,7 +68,7 @@ struct Recorded {
 TEST(Recording, GivesBackEveryFieldOfEveryPacketInARowPerFrame) {
   const Recorded recorded(all_kinds());
   EXPECT_EQ(recorded.frames(), frames_of(all_kinds()));
-  std::istringstream text(contents(recorded.path));
+  std::istringstream text(test::contents(recorded.path));
   int rows = -1; /* the header */
   for (std::string line; std::getline(text, line);) {
     rows += line[0] != '#';

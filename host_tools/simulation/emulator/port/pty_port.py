@@ -6,6 +6,7 @@ master side; the line is put into raw mode before the first client and after the
 polled while a client has it open.
 """
 
+import contextlib
 import os
 import pty
 import select
@@ -121,7 +122,5 @@ def main():
 
 
 if __name__ == "__main__":
-    try:
+    with contextlib.suppress(BrokenPipeError, KeyboardInterrupt):
         main()
-    except (BrokenPipeError, KeyboardInterrupt):
-        pass
