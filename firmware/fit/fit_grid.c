@@ -628,7 +628,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, con
   struct fit_spread spread;
   struct shape shape;
   const struct fit_columns_q q = {m.x.linear_q, m.y.linear_q, m.square_q - 1};
-  fit_grid_begin_spread(grid, settings, readings.shift, &system, &q, &spread);
+  fit_grid_begin_spread(readings.shift, &system, &q, &spread);
   begin_shape(&readings, &m, &system, &spread, &shape);
   spread_errors(grid, settings, &m, &system, &readings, &spread, &shape);
   uint32_t flags = judge_shape(&readings, settings, &system, &shape, &spread);

@@ -556,7 +556,7 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const stru
                                    struct columns *c, const struct fit_system *system, struct readings *room,
                                    struct fit_spread *spread) {
   const struct fit_columns_q q = {c->q1, c->q2, c->q3};
-  fit_grid_begin_spread(grid, settings, room->shift, system, &q, spread);
+  fit_grid_begin_spread(room->shift, system, &q, spread);
   const int32_t most = 3 << 14;
   for (int k = 0; k < NODES; k++) {
     struct node *node = &c->node[k];

@@ -104,7 +104,7 @@ struct fit_spread {
   struct scaled amplitude, softness;                        /* the latter 1 / stiffness */
   /* dF / F is that of e, p1, p2 and p3 times 1, off_x, off_y (Q26) and lift_q24. */
   int32_t off_x, off_y, lift_q24;
-  struct scaled past;  /* 1/16 Pa in shares of the amplitude, 1 / 2^16 */
+  struct scaled past;  /* 1/1024 Pa in shares of the amplitude, 1 / 2^16 */
   int32_t gain_shift;  /* gains Q16 are used with this number of bits more */
   int32_t shape_shift; /* the model error's shape in Q(21 - shape_shift) */
   /* Sums over the sensors. */
@@ -120,8 +120,7 @@ struct fit_spread {
 #define SPREAD_SQUARE_SHIFT (NODES > 15 ? 6 : 5)
 
 /* shift: the readings'. The columns have at most 1.5 * 2^15. */
-void fit_grid_begin_spread(const struct fit_grid_shape *grid, const struct fit_settings *settings, int32_t shift,
-                           const struct fit_system *system, const struct fit_columns_q *columns,
+void fit_grid_begin_spread(int32_t shift, const struct fit_system *system, const struct fit_columns_q *columns,
                            struct fit_spread *spread);
 
 /* The variances that the sums make: pitches squared, share of the force squared. */

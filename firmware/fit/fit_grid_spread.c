@@ -1,6 +1,8 @@
 #include "fit/fit_grid_solve.h"
 #include "fit/fit_limits.h"
 
+#include <string.h>
+
 #define UNROLL _Pragma("GCC unroll 6") /* for loops over the nodes of an axis */
 
 /* Columns times these stay within 31 bits with four of them. */
@@ -102,29 +104,34 @@ FIXED_INLINE void set_force_moves(const struct fit_system *system, const struct 
   spread->f3 = aligned[3];
 }
 
+/* What the sensors' pasts leave, as shares of the amplitude, each at most half: errors[NODES], 1 / 2^16. */
 #ifdef FT_WITHOUT_PAST
 FIXED_INLINE void set_past(int32_t shift, struct fit_spread *spread) { (void)shift, (void)spread; }
-FIXED_INLINE int32_t past_q16(const struct fit_settings *settings, uint8_t sensor, const struct fit_spread *spread) {
-  (void)settings, (void)sensor, (void)spread;
-  return 0;
+FIXED_INLINE void put_pasts(const uint8_t *sensor, const struct fit_settings *settings, const struct fit_spread *spread,
+                            int32_t *errors) {
+  (void)sensor, (void)settings, (void)spread;
+  memset(errors, 0, NODES * sizeof errors[0]);
 }
 #else
 FIXED_INLINE void set_past(int32_t shift, struct fit_spread *spread) {
   spread->past = fit_grid_reciprocal(spread->amplitude);
-  spread->past.exponent += shift - 28 + 6 + 16;
+  spread->past.exponent += shift - 28 + 16;
 }
-/* What a sensor's past leaves, as a share of the amplitude, at most half. */
-FIXED_INLINE int32_t past_q16(const struct fit_settings *settings, uint8_t sensor, const struct fit_spread *spread) {
-  int32_t past_q4 = fixed_clamp(settings->past_sd_Pa_q10[sensor] >> 6, 0, INT16_MAX);
-  if (past_q4 == 0) {
-    return 0;
+FIXED_INLINE void put_pasts(const uint8_t *sensor, const struct fit_settings *settings, const struct fit_spread *spread,
+                            int32_t *errors) {
+  int32_t any = INT16_MAX;
+  for (int k = 0; k < NODES; k++) {
+    any |= settings->past_sd_Pa_q10[sensor[k]];
   }
-  return fixed_clamp(shifted(past_q4 * spread->past.mantissa, spread->past.exponent), 0, INT16_MAX);
+  const int32_t less = fixed_bits((uint32_t)any) - 15;
+  for (int k = 0; k < NODES; k++) {
+    const int32_t past = settings->past_sd_Pa_q10[sensor[k]] >> less;
+    errors[k] = fixed_clamp(shifted(past * spread->past.mantissa, spread->past.exponent + less), 0, INT16_MAX);
+  }
 }
 #endif
 
-NOINLINE void fit_grid_begin_spread(const struct fit_grid_shape *grid, const struct fit_settings *settings,
-                                    int32_t shift, const struct fit_system *system, const struct fit_columns_q *columns,
+NOINLINE void fit_grid_begin_spread(int32_t shift, const struct fit_system *system, const struct fit_columns_q *columns,
                                     struct fit_spread *spread) {
   spread->inverse_mass = fit_grid_reciprocal(fit_scaled_from(system->mass_q20, -20));
   spread->inverse1 = fit_grid_reciprocal(system->d1);
@@ -143,16 +150,6 @@ NOINLINE void fit_grid_begin_spread(const struct fit_grid_shape *grid, const str
   spread->shape_shift = fixed_bits((uint32_t)most_q21) - 15;
 
   set_past(shift, spread);
-  uint32_t gains = 1;
-  for (int k = 0; k < NODES; k++) {
-    uint8_t sensor = grid->sensor[k];
-    int32_t error = fixed_longer_leg(settings->gain_sd_q16[sensor], past_q16(settings, sensor, spread));
-    gains |= (uint32_t)fixed_clamp(error, 0, UINT16_MAX);
-  }
-  if (fit_has_dip(settings)) {
-    gains |= (uint32_t)FIT_DIP_ERROR_Q16 >> 2; /* the dip is at most a quarter */
-  }
-  spread->gain_shift = 15 - fixed_bits(gains);
   spread->apart = (struct scaled){0, 0};
   spread->by_gains = spread->force_by_gains = 0;
 }
@@ -176,12 +173,18 @@ NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid, const struc
   }
   const uint8_t *sensor = grid->sensor;
   int32_t *errors = room->q14;
+  uint32_t most = fit_has_dip(settings) ? (uint32_t)FIT_DIP_ERROR_Q16 >> 2 : 1; /* the dip is at most a quarter */
+  put_pasts(sensor, settings, spread, errors);
+  for (int k = 0; k < NODES; k++) {
+    most |= (uint32_t)fixed_longer_leg(settings->gain_sd_q16[sensor[k]], errors[k]);
+  }
+  spread->gain_shift = 15 - fixed_bits(most < UINT16_MAX ? most : UINT16_MAX);
   uint32_t gains = 0;
   int32_t gain_shift = spread->gain_shift + 1;
   at_node = room->q28;
   for (int k = 0; k < NODES; k++) {
     uint32_t gain = (uint32_t)settings->gain_sd_q16[sensor[k]] << gain_shift;
-    int32_t past = shifted(past_q16(settings, sensor[k], spread), spread->gain_shift);
+    int32_t past = shifted(errors[k], spread->gain_shift);
     int32_t error = fixed_longer_leg((int32_t)((gain * (uint32_t)at_node[k]) >> 16), past);
     errors[k] = error;
     gains += (uint32_t)(error * error) >> SPREAD_SQUARE_SHIFT;

@@ -7,9 +7,8 @@
 #include <stddef.h>
 
 #define FAR_WIDTHS 6.25f /* FAR: the dip that the recordings of real pads show */
-#define LINE_Q16                                                                                                       \
-  5461 /* a twelfth of the line's square: half of what it adds to a spread, as steps do not know of it                 \
-        */
+/* A twelfth of the line's square: half of what it adds to a spread, as steps do not know of it. */
+#define LINE_Q16 5461
 #define KAPPA_Q14 21299 /* 1.3, as in fit_tangential.c */
 #define LOG2E_HALF_FLOAT 0.72134752f
 #define SQUARE_MAX_Q24 (40 << 24)

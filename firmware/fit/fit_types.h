@@ -73,7 +73,7 @@ struct fit_settings {
   const struct fit_own *own;
   /* Other errors that the standard deviations contain. */
   uint16_t gain_sd_q16[FT_MAX_SENSORS];   /* [sensor] relative sd of its gain; 0: exact */
-  int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* [sensor] sd of what rubber keeps of presses, 1/1024 Pa; 0..2^29 */
+  int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* [sensor] sd of what rubber keeps, before gains, 1/1024 Pa; 0..2^29 */
   uint16_t model_sd_q16;                  /* sd of the model's own error, as a share of the largest reading; 0: none */
   float location_sd_limit_mm;             /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
 };
