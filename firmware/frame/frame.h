@@ -20,7 +20,7 @@ struct frame {
   int32_t noise_Pa_q10;    /* rms noise of a reading at this conversion's OSR, 1/1024 Pa */
   int16_t temperature_cC;  /* mean of the sensors, 0.01 degC; 0 until first measured */
   uint32_t renewed;        /* bitmap: another sensor than in the frame before, with another zero */
-  uint32_t restored;       /* bitmap: reset since the frame before, or warmer, or stepped alone */
+  uint32_t restored;       /* bitmap: a reset brought back its state, or it stepped alone, since the frame before */
   uint32_t valid;          /* bitmap: pressure is a measurement */
   uint32_t doubtful;       /* bitmap: valid, but there is reason to doubt the reading */
   uint32_t unsettled;      /* bitmap: doubtful until the next temperature settles it */

@@ -1,22 +1,24 @@
 /* From codes to readings, and which of them to believe. Main context; no bus, and no time but the frame's.
  *
- * Temperatures. A temperature may differ by more than READINGS_TEMPERATURE_STEP_MAX_cC from the sensor's last. That is
- * no change of temperature. The last one stays in use, and the sensor is doubtful: each degree is worth some 240 Pa.
- * Two of them that agree with each other come from a sensor that has lost its state as its supply failed. It becomes a
- * suspect. The first temperature of a sensor must be near the others', too. If the sensor reports the same twice before
- * a reset and after each of two, it is believed and stays doubtful. (After one reset it may have lost its state again:
- * supplies that dip once do so twice.)
+ * Temperatures. A temperature may differ by more than READINGS_TEMPERATURE_STEP_MAX_cC from the sensor's last, or
+ * READINGS_TEMPERATURE_NEAR_cC if that one is old (is_late). That is no change of temperature. The last one stays in
+ * use, and the sensor is doubtful: each degree is worth some 240 Pa. Two of them that agree with each other come from a
+ * sensor that has lost its state as its supply failed. It becomes a suspect. The first temperature of a sensor must be
+ * near the others', too. If the sensor reports the same twice before a reset and after each of two, it is believed and
+ * stays doubtful. (After one reset it may have lost its state again: supplies that dip once do so twice.)
  *
  * Pressures. A pressure below zero is left out. A second in a row makes the sensor a suspect. A large step of one
- * sensor alone is left out as well, since rubber lets its neighbours feel any press. If the next reading is back, that
- * was all. If it stays, still alone, the sensor is a suspect. Steps beside which others move count at once. So does
- * every step while a sensor is missing, since that one may feel it.
+ * sensor alone is left out as well, since rubber passes any press on to its neighbours. If the next reading is back,
+ * that was all. If it stays, still alone, the sensor is a suspect. Steps beside which others move count at once. So
+ * does every step while a sensor is missing, since that one may have measured it.
  *
  * A sensor whose supply dips may lose its state, and go on with codes that are off. Then it reads 0 once where its
  * conversion was lost, or its pressure falls, and its temperature steps. So one that reads 0 is left out until its next
- * temperature, which is asked for at once. One whose pressure falls at once with others' is doubtful until then, but
- * used, for a release does the same where frames are 5 ms or more apart. If the temperature has stepped from the
- * sensor's own last it has lost its state, whatever the others do.
+ * temperature, which is asked for at once. One whose pressure falls by READINGS_JOLT_Pa_q10 at once with others' is
+ * doubtful until then, but used, for a release does the same where frames are 5 ms or more apart in the twin: at 57
+ * frames/s each quick release of more than 6 kPa. Only frames whose sum moves by as much are searched for it: moves
+ * that compensate each other hide a fall. If the temperature has stepped from the sensor's own last it has lost its
+ * state, whatever the others do.
  *
  * A suspect is left out until it has been reset and its PROM read again. Then its temperature and its pressure count as
  * its first. Its zero still holds, since it is the same sensor, unless it was measured shortly before (condition.h).
@@ -100,6 +102,7 @@ struct readings_temperature {
   uint32_t returned;              /* bitmap: was reset, perhaps after long */
   uint32_t prom_bad;              /* bitmap: the CRC differs */
   uint32_t admitted;              /* bitmap */
+  bool is_late;                   /* long after the one before */
 };
 
 enum readings_news {

@@ -9,6 +9,8 @@
 /* After a temperature reading that a sensor missed, or one in doubt. */
 #define TEMPERATURE_RETRY_us 100000u
 #define TEMPERATURE_AT_ONCE_us 1u
+/* After so long the sensors may have warmed by more than a degree: a hand warms them by 0.1 degC/s. */
+#define TEMPERATURE_LATE_us 5000000u
 /* How soon a temperature that was not taken is tried again. */
 #define SLOT_POLL_us 1000u
 /* How soon a new rate is noticed while waiting for the next frame of the old one. */
@@ -131,6 +133,7 @@ static void end_bring_up(struct scan *scan, uint64_t now_us) {
   set(&scan->temperature_within_us, 0); /* the next conversion is one */
   scan->void_next = 0;
   scan->was_zero = 0;
+  scan->zero_seen = 0;
   scan->missed_once = 0;
   scan->missed_twice = 0;
   convert(scan, true, false);
@@ -213,6 +216,7 @@ static uint32_t take_codes(struct scan *scan, const struct scan_conversion *conv
 static void take_reading(struct scan *scan, const struct scan_conversion *conversion) {
   struct scan_slot *slot = slot_for(scan, conversion);
   uint32_t good = take_codes(scan, conversion, slot ? slot->code : NULL);
+  scan->zero_seen |= scan->was_zero;
   if (conversion->is_frame) {
     count(&scan->counters.frames, 1);
     if (good != all_sensors(scan)) {
@@ -232,17 +236,21 @@ static void take_reading(struct scan *scan, const struct scan_conversion *conver
   }
   slot->conversion = *conversion;
   slot->good = good;
-  slot->zero = scan->was_zero;
   if (conversion->is_temperature) {
     slot->prom_changed = scan->bring_up.changed;
     slot->returned = scan->returned;
     scan->bring_up.changed = 0;
     scan->returned = 0;
+  } else {
+    slot->zero = (get(&scan->slot_state) == SCAN_SLOT_FULL ? slot->zero : 0) | scan->zero_seen;
+    scan->zero_seen = 0;
   }
   hand_over(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state, SCAN_SLOT_FULL);
 }
 
 static bool temperature_waits(const struct scan *scan) { return get(&scan->temperature_state) != SCAN_SLOT_EMPTY; }
+
+static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
 static void obey_wish(struct scan *scan, uint64_t now_us) {
   uint32_t within_us = get(&scan->temperature_within_us);
@@ -250,9 +258,7 @@ static void obey_wish(struct scan *scan, uint64_t now_us) {
     return;
   }
   set(&scan->temperature_within_us, 0);
-  if (scan->next_temperature_us > now_us + within_us) {
-    scan->next_temperature_us = now_us + (within_us & ~TEMPERATURE_AT_ONCE_us);
-  }
+  scan->next_temperature_us = earlier(scan->next_temperature_us, now_us + within_us - 1);
 }
 
 /* When to convert the temperature in the pause before the next frame; UINT64_MAX: not in this one,
@@ -264,8 +270,6 @@ static uint64_t temperature_in_pause_us(const struct scan *scan, uint64_t now_us
   }
   return scan->next_frame_us - slot_us - slot_us / 8;
 }
-
-static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
 /* Between two operations: true if none is to follow for now. */
 static bool rest(struct scan *scan, uint64_t now_us) {
@@ -512,7 +516,9 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
       .returned = slot->returned,
       .prom_bad = get(&scan->prom_bad),
       .admitted = get(&scan->admitted),
+      .is_late = slot->conversion.t_us - scan->temperature_us > TEMPERATURE_LATE_us,
   };
+  scan->temperature_us = slot->conversion.t_us;
   adapt_interval(scan, readings_take_temperature(&scan->readings, scan->sensor_count, &taken));
 }
 

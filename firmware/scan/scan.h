@@ -97,7 +97,7 @@ struct scan_conversion {
 struct scan_slot {
   struct scan_conversion conversion;
   uint32_t good;                 /* bitmap: the code is a measurement */
-  uint32_t zero;                 /* bitmap: read 0 */
+  uint32_t zero;                 /* bitmap: has read 0 since the last one that was taken. Of a frame */
   uint32_t prom_changed;         /* bitmap: another sensor than before. Of a temperature */
   uint32_t returned;             /* bitmap: admitted again, perhaps after long. Of a temperature */
   uint32_t code[FT_MAX_SENSORS]; /* [sensor] 24-bit */
@@ -117,7 +117,7 @@ struct scan {
   const struct ms58xx_osr *_Atomic osr;
   _Atomic uint32_t period_us;               /* of frames; 0: as fast as the sensors allow */
   _Atomic uint32_t temperature_interval_us; /* set by the main context */
-  _Atomic uint32_t temperature_within_us;   /* if not 0, the next so soon. Set while the slot of
+  _Atomic uint32_t temperature_within_us;   /* if not 0, the next in less. Set while the slot of
                                                the temperature is claimed, reset while it is empty */
   _Atomic uint32_t suspects;                /* bitmap: to be reset. Set by the main context */
   _Atomic uint32_t must_rest;
@@ -138,6 +138,7 @@ struct scan {
   uint32_t frame_number;
   uint32_t void_next;    /* bitmap: the next reading does not count */
   uint32_t was_zero;     /* bitmap: the last reading was 0 */
+  uint32_t zero_seen;    /* bitmap: one was, of either kind, since the slot of the frame was filled */
   uint32_t missed_once;  /* bitmap: the last reading was not acknowledged, ... */
   uint32_t missed_twice; /* ... nor the one before */
   uint32_t returned;     /* bitmap: admitted, and was not before */
@@ -158,7 +159,9 @@ struct scan {
   _Atomic uint32_t prom_bad; /* bitmap: after all attempts its CRC differs, or it is blank */
   struct scan_counters counters;
 
-  struct readings readings; /* main context only */
+  /* Main context only. */
+  uint64_t temperature_us; /* of the last one used */
+  struct readings readings;
 };
 
 /* FT_ERR_ARGUMENT: a setting outside its range. The bus must outlive the scan. */

@@ -44,7 +44,7 @@ static struct company keep_company(const struct readings *readings, uint8_t sens
 }
 
 /* Whether to use a temperature that something speaks against. */
-static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const struct company *company) {
+static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const struct company *company, bool is_late) {
   uint32_t bit = UINT32_C(1) << k;
   bool possible = now_cC >= TEMPERATURE_MIN_cC && now_cC <= TEMPERATURE_MAX_cC;
   bool near = possible && (!company->votes || within(now_cC - company->middle_cC, READINGS_TEMPERATURE_NEAR_cC));
@@ -55,7 +55,9 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const s
     use = near || (agrees && possible && (readings->pardoned & bit));
     insists = agrees && !use;
   } else {
-    use = within(now_cC - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_STEP_MAX_cC);
+    const int32_t most_cC =
+        is_late && !readings->jolted ? READINGS_TEMPERATURE_NEAR_cC : READINGS_TEMPERATURE_STEP_MAX_cC;
+    use = within(now_cC - readings->thermal[k].first_order_cC, most_cC);
     insists = !use && (agrees || readings->jolted);
     readings->jolted |= insists && readings->jolted ? bit : 0;
   }
@@ -179,7 +181,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     if (!(taken->good & bit)) {
       continue;
     }
-    if (unusual && !settle(readings, k, now_cC[k], &company)) {
+    if (unusual && !settle(readings, k, now_cC[k], &company, taken->is_late)) {
       news |= READINGS_ASK_AGAIN;
       continue;
     }

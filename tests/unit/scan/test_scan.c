@@ -59,8 +59,7 @@ TEST(test_saturation_is_reported_at_the_end_of_the_range) {
   assert_good_frame(ALL);
 }
 
-/* The fake counts as misuse what comes before the datasheet's longest times; here: not much later.
- */
+/* The fake counts as misuse what comes before the datasheet's longest times; here: not much later. */
 TEST(test_waits_at_every_osr) {
   for (int i = 0; i < 6; i++) {
     next_case_of((uint16_t)(256 << i), 0);
