@@ -33,10 +33,9 @@
  * or where one moves on, and fades with PAST_ms. The share is learnt from what stands off after each contact.
  *
  * The level of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
- * is taken again if it was taken in the five seconds before its sensor was reset (the sensor had lost its state), or
- * before the temperature turned out to be another. No single sensor is tared in a contact that others measure. It waits
- * for eight seconds at most, since wrong zeros may make that contact. Such a zero is a guess until the contact ends.
- * Then it is taken again.
+ * is taken again if it was taken in the five seconds before its sensor was reset as it had lost its state, or stepped
+ * alone. No single sensor is tared in a contact that others measure. It waits for eight seconds at most, since wrong
+ * zeros may make that contact. Such a zero is a guess until the contact ends. Then it is taken again.
  *
  * Doubt: a zero that has moved and a force may look alike. A zero may be off by what it took: wander is what the level
  * moved, taken is what level and remainder moved since the zero was proven. A press without doubt proves it: what the
@@ -121,7 +120,7 @@ struct condition {
   int32_t zero_Pa_q10[FT_MAX_SENSORS];    /* [sensor] 1/1024 Pa, as all here: level + remainder */
   int32_t faded_Pa_q10[FT_MAX_SENSORS];   /* of the remainder, in this contact */
   int32_t margin_Pa_q10[FT_MAX_SENSORS];  /* by which the gate is higher */
-  int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* of a pressure: what a press before and this hold leave in it */
+  int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* of a reading: what a press before and this hold leave in it */
   int32_t sum_Pa_q10[FT_MAX_SENSORS];     /* of readings above the zero, since the last update */
   uint8_t summed[FT_MAX_SENSORS];         /* readings in the sum */
   struct condition_sensor sensor[FT_MAX_SENSORS];
@@ -149,11 +148,10 @@ void condition_start(struct condition *condition);
 void condition_tare(struct condition *condition);
 
 /* Processes one frame, later than the one before by frame->t_us. Do not pass held frames. gains: NULL for sensors that
- * are all alike. Call condition_follow() between two frames. Cost: about 105 Cortex-M0+ cycles a sensor in contact, 190
- * without. */
+ * are all alike. Call condition_follow() between two frames. */
 void condition_frame(struct condition *condition, const struct frame *frame, const struct condition_gains *gains,
                      struct conditioned *conditioned);
 
 /* Updates the sensors that are due with the frame just processed. In a contact only the frames to come need it, so its
- * answer can be sent before. A second call does nothing. Cost: about 420 cycles a sensor, once in UPDATE_ms. */
+ * answer can be sent before. A second call does nothing. */
 void condition_follow(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned);

@@ -54,10 +54,11 @@ struct contact_force contact_weigh(const struct contact_settings *settings, cons
 /* Without slip. */
 void contact_judge(const struct contact_input *input, struct contact_result *result);
 
-/* With slip. Locations flagged FLAT, AT_BOUND or ZERO_DOUBTFUL do not enter the slip history.
- * Neither do those whose noise alone has a standard deviation above CONTACT_JITTER_MAX_mm. The
- * history starts again after them, as after a loss of contact. At that limit noise alone exceeds
- * the usual threshold of 0.75 mm once in a million frames. */
+/* With slip. Locations flagged FLAT, AT_BOUND or ZERO_DOUBTFUL do not enter the slip history. Neither do those whose
+ * noise alone has a standard deviation above CONTACT_JITTER_MAX_mm. The history starts again after them, as after a
+ * loss of contact. At that limit noise alone exceeds the usual threshold of 0.75 mm once in a million frames. Of other
+ * settled sensors the first frame does not enter either, and a second starts again. Velocity starts again with the
+ * first frame of other sensors, settled or not (motion.h). The tangential force is estimated from every frame. */
 #define CONTACT_JITTER_MAX_mm 0.2f
 
 void contact_update(struct slip_history *history, const struct contact_settings *settings,
