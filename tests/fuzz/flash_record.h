@@ -1,5 +1,4 @@
-/* Records in the flash as store.h says, with whatever payload: what a later firmware, or a bug,
- * may have left. */
+/* Records in the flash as store.h says, with whatever payload: what a later firmware, or a bug, may have left. */
 #pragma once
 
 #include "common/bytes.h"

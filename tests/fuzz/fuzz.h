@@ -1,7 +1,6 @@
-/* What every fuzz target is made of: one function that takes bytes, a reader for them, and a check
- * that stops the program. Bytes and runs are counted by fuzz.c in the file that the environment's
- * FINGERTIP_FUZZ_COUNT names, also where a run ends the program.
- */
+/* What every fuzz target is made of: one function that takes bytes, a reader for them, and a check that stops the
+ * program. Bytes and runs are counted by fuzz.c in the file that the environment's FINGERTIP_FUZZ_COUNT names, also
+ * where a run ends the program. */
 #pragma once
 
 #include <stdbool.h>

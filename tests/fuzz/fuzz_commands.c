@@ -1,5 +1,4 @@
-/* The firmware's command receiver, with the firmware around it: bytes and commands in, packets out.
- */
+/* The firmware's command receiver, with the firmware around it: bytes and commands in, packets out. */
 #include "app/app.h"
 #include "config/geometry.h"
 #include "flash_record.h"

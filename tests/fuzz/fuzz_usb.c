@@ -1,7 +1,6 @@
-/* The USB device before a host that keeps no rule: any sequence of transactions on its control and
- * bulk endpoints, resets and suspensions, while its main loop reads and writes. A breach of the
- * controller's contract stops it (fake_controller.h).
- */
+/* The USB device before a host that keeps no rule: any sequence of transactions on its control and bulk endpoints,
+ * resets and suspensions, while its main loop reads and writes. A breach of the controller's contract stops it
+ * (fake_controller.h). */
 #include "fuzz.h"
 #include "unit/usb/enumerate.h"
 #include "unit/usb/fake_controller.h"
@@ -114,8 +113,7 @@ static void bring_up(void) {
   FUZZ_CHECK(cdc_is_open());
 }
 
-/* The rings go on where the run before left them. So that each run is as the first: to a place
- * that never changes. */
+/* The rings go on where the run before left them. So that each run is as the first: to a place that never changes. */
 static void begin(void) {
   plug_in();
   bring_up();

@@ -1,6 +1,5 @@
-/* The job that the main loop and a worker on a processor of its own hand to each other. Each in
- * turn is the one that is interrupted, at every access to what both know, by whole steps of the
- * other. */
+/* The job that the main loop and a worker on a processor of its own hand to each other. Each in turn is the one that is
+ * interrupted, at every access to what both know, by whole steps of the other. */
 #include "explore.h"
 #include "support/unit.h"
 #include "worker/worker.h"

@@ -1,6 +1,5 @@
 /* Presses whose fits are compared bit by bit between machines. They are drawn from their number with integers alone, so
- * that every machine has the same.
- */
+ * that every machine has the same. */
 #pragma once
 
 #include <stdint.h>

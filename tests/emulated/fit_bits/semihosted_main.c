@@ -1,6 +1,5 @@
-/* An image for a machine of QEMU: prints the CRC of each press through semihosting (ARM,
- * "Semihosting for AArch32 and AArch64"), for the kernels that the command line names by their
- * numbers. */
+/* An image for a machine of QEMU: prints the CRC of each press through semihosting (ARM, "Semihosting for AArch32 and
+ * AArch64"), for the kernels that the command line names by their numbers. */
 #include "fit_bits.h"
 
 #include <stdint.h>

@@ -18,8 +18,7 @@ void storm_firmware_power_sensors(uint64_t seed);
 /* Their supply fails and comes back. */
 void storm_firmware_cut_sensors(void);
 
-/* The chip starts, its clock at clock_us, so long after its last start; flash and sensors are as
- * they are. */
+/* The chip starts, its clock at clock_us, so long after its last start; flash and sensors are as they are. */
 void storm_firmware_start(uint64_t elapsed_us, uint64_t clock_us);
 
 /* Device time. */

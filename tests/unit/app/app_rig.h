@@ -1,5 +1,4 @@
-/* The whole firmware on the host: simulated sensors below, a USB host above. For one test program.
- */
+/* The whole firmware on the host: simulated sensors below, a USB host above. For one test program. */
 #pragma once
 
 #include "app/app.h"
@@ -56,8 +55,7 @@ static inline void on_event(void *context) { app_on_event(context); }
 
 static inline void main_round(void *context) { app_run(context); }
 
-/* Power goes and comes back, when the clock shows this; what the flash holds stays, and so does the
- * world. */
+/* Power goes and comes back, when the clock shows this; what the flash holds stays, and so does the world. */
 static inline void rig_power_up_at(uint64_t t_us, bool watchdog_struck) {
   native_flash_power_up();
   native_start(watchdog_struck);
@@ -137,8 +135,7 @@ static inline struct wire_contact newest_contact(void) {
   return newest;
 }
 
-/* Sends a command and returns the result of its acknowledgement; storing takes longer than others.
- */
+/* Sends a command and returns the result of its acknowledgement; storing takes longer than others. */
 static inline uint8_t ask(struct wire_packet command) {
   struct wire_packet packet;
   bool stores = (command.type >= WIRE_CMD_CALIBRATE && command.type <= WIRE_CMD_KEEP) || command.type == WIRE_CMD_PAD ||

@@ -186,8 +186,7 @@ TEST(what_is_none_of_these_is_warned_of_all_the_time) {
   }
 }
 
-/* Frames that come fast keep what a search for an outlier found; slow ones have time for their own.
- */
+/* Frames that come fast keep what a search for an outlier found; slow ones have time for their own. */
 TEST(a_search_for_an_outlier_is_of_fast_frames) {
   put(1.5, -4.0, 5.0);
   last_of_press();

@@ -163,8 +163,7 @@ TEST(settings_are_kept_when_asked_for_and_forgotten_likewise) {
   TEST_ASSERT_EQUAL_FLOAT(built.prior_width_mm, info.prior_width_mm);
 }
 
-/* A frame that is held after it must not say what was so before: who waits for TARED would go on.
- */
+/* A frame that is held after it must not say what was so before: who waits for TARED would go on. */
 TEST(after_a_tare_no_frame_says_tared_before_it_is) {
   press.force_N = 5.0;
   connect_for(300);

@@ -65,8 +65,7 @@ static struct wire_contact last_contact(uint64_t from_us, uint64_t t_us, uint32_
 
 static const uint32_t TANGENTIAL = CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_TANGENTIAL_FROM_TOUCH;
 
-/* The Gaussian fit is pulled along by the load; with the profile it is not, and the load is told.
- */
+/* The Gaussian fit is pulled along by the load; with the profile it is not, and the load is told. */
 TEST(a_profile_tells_the_load_and_corrects_the_location) {
   load.qx_N = 1.2;
   load.qy_N = -0.9;
@@ -98,8 +97,7 @@ TEST(without_a_profile_there_is_none_and_the_fit_stays_as_it_is) {
   TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.qx_N);
 }
 
-/* Until the readings have been looked at it is 0.2 of the force: for one frame where they are far
- * apart. */
+/* Until the readings have been looked at it is 0.2 of the force: for one frame where they are far apart. */
 TEST(a_load_that_is_not_estimated_is_part_of_the_error) {
   for (int kind = 0; kind < 4; kind++) {
     const bool loaded = kind % 2 != 0, slow = kind < 2;

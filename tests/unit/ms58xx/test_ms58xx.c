@@ -16,8 +16,7 @@ static const struct ms58xx_prom example = {{0, 46372, 43981, 29059, 27842, 31553
 /* The PROM of a real MS5840 as a driver's author published it. */
 static const struct ms58xx_prom real_part = {{26785, 41335, 41466, 26840, 27317, 31225, 28780}};
 
-/* The datasheet's formulas once more, with divisions that round down and integers that hold
- * everything. */
+/* The datasheet's formulas once more, with divisions that round down and integers that hold everything. */
 typedef __int128 wide;
 
 static wide divide(wide a, wide b) {
@@ -286,8 +285,7 @@ TEST(test_extremes_saturate) {
       }
     }
   }
-  /* No offset and the greatest sensitivity with the greatest code read 4 MPa and more: beyond
-   * an int32 of 1/1024 Pa. */
+  /* No offset and the greatest sensitivity with the greatest code read 4 MPa and more: beyond an int32 of 1/1024 Pa. */
   const struct ms58xx_prom highest = {{0, UINT16_MAX, 0, UINT16_MAX, 0, 0, 0}};
   TEST_ASSERT_EQUAL_INT32(INT32_MAX, pressure_Pa_q10(&highest, CODE_MAX, CODE_MAX, MS58XX_BRANCH_UNKNOWN));
   const struct ms58xx_prom lowest = {{0, 0, UINT16_MAX, UINT16_MAX, 0, UINT16_MAX, 0}};

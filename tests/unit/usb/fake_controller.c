@@ -48,8 +48,7 @@ static void assert_device_context(void) {
   TEST_ASSERT_TRUE_MESSAGE(fake.in_interrupt, "called outside the interrupt context");
 }
 
-/* usb_controller.h ------------------------------------------------------------------------------
- */
+/* usb_controller.h ------------------------------------------------------------------------------ */
 
 void usb_controller_start(void) { fake.attached = true; }
 
@@ -146,8 +145,7 @@ void usb_controller_unstall(uint8_t endpoint) {
   e->data1 = false;
 }
 
-/* Test side --------------------------------------------------------------------------------------
- */
+/* Test side -------------------------------------------------------------------------------------- */
 
 void fake_power_on(void) {
   memset(&fake, 0, sizeof fake);

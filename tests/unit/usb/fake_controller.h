@@ -1,7 +1,6 @@
-/* A USB controller with a host at its other end, for tests: usb_controller.h is implemented here,
- * and host_ functions do single transactions the way a host does, PIDs included. Any breach of the
- * controller's contract fails the running test.
- */
+/* A USB controller with a host at its other end, for tests: usb_controller.h is implemented here, and host_ functions
+ * do single transactions the way a host does, PIDs included. Any breach of the controller's contract fails the running
+ * test. */
 #pragma once
 
 #include <stdbool.h>
@@ -17,14 +16,12 @@ bool fake_is_attached(void);
 void fake_hold_interrupts(void);
 void fake_run_interrupts(void);
 
-/* A packet that the host takes before the device's next withdrawal, but whose interrupt has not
- * been served by then. */
+/* A packet that the host takes before the device's next withdrawal, but whose interrupt has not been served by then. */
 void fake_take_at_next_withdrawal(void);
 
 bool fake_accepts(uint8_t endpoint);
 
-/* The controller asks by itself whether USB is looked after; how often it was said since power-on
- * that it is. */
+/* The controller asks by itself whether USB is looked after; how often it was said since power-on that it is. */
 void fake_service(void);
 unsigned fake_signs_of_life(void);
 
