@@ -10,6 +10,7 @@ import json
 import pathlib
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -23,6 +24,7 @@ import wiring  # noqa: E402
 
 HEADERS = pathlib.Path(sys.argv[1])
 DESCRIPTORS = {path.parent.name: json.loads(path.read_text(encoding="utf-8")) for path in sorted(ROOT.glob("boards/*/board.json"))}
+PROJECT = f"cmake_minimum_required(VERSION 3.25)\nproject(boards NONE)\ninclude({ROOT}/cmake/boards.cmake)\n"
 BY_BUS = {descriptor["bus"]: (name, descriptor) for name, descriptor in DESCRIPTORS.items()}
 
 
@@ -88,6 +90,38 @@ class Wiring(unittest.TestCase):
             wiring.board_of(name, descriptor)
         with self.assertRaisesRegex(wiring.Unwired, "no drawing knows the bus semaphore"):
             wiring.board_of(name, {**descriptor, "bus": "semaphore"})
+
+    def test_what_the_build_refuses(self):
+        for bus, key, value, why in (
+            ("multiplexed", "pin_sda", 44, "a Pico leads out GPIO 0 to 22"),
+            ("multiplexed", "pin_sda", 6, "I2C0 has SDA on"),
+            ("multiplexed", "pin_scl", "4", "I2C0 has SDA on"),
+            ("multiplexed", "pin_mux_reset_0", 5, "GPIO 5 is pin_scl already"),
+            ("multiplexed", "pin_mux_reset_0", 21, "GPIO 22 is pin_sync already"),
+            ("multiplexed", "pin_mux_reset_0", 27, "does not lead out GPIO 29"),
+            ("multiplexed", "pin_sync", 25, "does not lead out GPIO 25"),
+            ("multiplexed", "mux_address_0", "0x6F", "3 TCA9548A from there on must be within"),
+            ("multiplexed", "mux_address_0", "0x76", "3 TCA9548A from there on must be within"),
+            ("multiplexed", "mux_address_0", "0x74", "has the address of the sensors"),
+            ("multiplexed", "sensors_of_strip", 9, "a TCA9548A has eight channels"),
+            ("multiplexed", "sensors_of_strip", 4, "15 sensors do not make whole strips"),
+            ("parallel", "sensors_of_strip", 0, "a strip has 1 to 15"),
+            ("parallel", "sensor_address", "0x40", "have the address 0x76 or 0x77"),
+            ("parallel", "sensor_count", "", "1 to 32 sensors are read"),
+            ("parallel", "pin_scl", 14, "SCL is above the data lines"),
+            ("parallel", "pin_sync", 15, "GPIO 15 is pin_scl already"),
+        ):
+            with tempfile.TemporaryDirectory() as folder, self.subTest(bus=bus, key=key, value=value):
+                name, descriptor = copy.deepcopy(BY_BUS[bus])
+                descriptor["wiring"][key] = value
+                board = pathlib.Path(folder, "boards", name)
+                board.mkdir(parents=True)
+                (board / "board.json").write_text(json.dumps(descriptor), encoding="utf-8")
+                pathlib.Path(folder, "CMakeLists.txt").write_text(PROJECT, encoding="utf-8")
+                done = subprocess.run(["cmake", "-S", folder, "-B", f"{folder}/build"], capture_output=True, text=True)
+                self.assertNotEqual(done.returncode, 0)
+                self.assertIn(f'boards/{name}/board.json: {key} is "{value}": ', " ".join(done.stderr.split()))
+                self.assertIn(why, " ".join(done.stderr.split()))
 
     def test_numbers_of_resistors(self):
         self.assertEqual([draw.yageo(ohm) for ohm in (33, 4.7, 1000, 2200, 3300, 10000)], ["33R", "4R7", "1K", "2K2", "3K3", "10K"])
