@@ -110,6 +110,9 @@ foreach(option FINGERTIP_PRIOR_SIGMA_UM FINGERTIP_PRIOR_WIDTH_UM)
   endif()
 endforeach()
 
+# GPIO 23 sets the regulator's mode on a Pico, and powers the radio on a Pico W.
+option(FINGERTIP_PICO_W "For a Pico W: leave GPIO 23 alone" OFF)
+
 # 1209:0001 is the pid.codes id for tests: a product needs its own.
 set(FINGERTIP_USB_VID 0x1209 CACHE STRING "USB vendor id")
 set(FINGERTIP_USB_PID 0x0001 CACHE STRING "USB product id")

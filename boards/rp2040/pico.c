@@ -9,7 +9,7 @@ void pico_set_supply(enum pico_supply supply) { gpio_write(PIN_REGULATOR_MODE, s
 
 enum ft_status pico_start(void) {
   const enum ft_status status = resets_release(RESETS_IO_BANK0 | RESETS_PADS_BANK0);
-  if (status == FT_OK) {
+  if (status == FT_OK && !FT_PICO_W) {
     pico_set_supply(PICO_SUPPLY_STEADY);
     gpio_drive(PIN_REGULATOR_MODE, true);
     gpio_set_pad(PIN_REGULATOR_MODE, GPIO_PULL_NONE);

@@ -8,7 +8,8 @@ enum pico_supply {
   PICO_SUPPLY_STEADY, /* at a fixed rate: less ripple, for it feeds the sensors */
 };
 
-/* Takes the pin into use, steady. FT_ERR_TIMEOUT: a block does not leave reset. */
+/* Takes the pin into use, steady, but on a Pico W, where it is another's (FINGERTIP_PICO_W): the supply stays frugal.
+ * FT_ERR_TIMEOUT: a block does not leave reset. */
 enum ft_status pico_start(void);
 
 void pico_set_supply(enum pico_supply supply);

@@ -52,7 +52,12 @@ class ThirdBoard(unittest.TestCase):
         (board / "board.json").write_text(json.dumps(descriptor))
         cls.build = cls.tree / "build" / THIRD
         toolchain = cls.tree / "cmake/toolchain-arm-none-eabi.cmake"
-        settings = ("-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_TOOLCHAIN_FILE={toolchain}", f"-DFINGERTIP_BOARD={THIRD}")
+        settings = (
+            "-DCMAKE_BUILD_TYPE=Release",
+            f"-DCMAKE_TOOLCHAIN_FILE={toolchain}",
+            f"-DFINGERTIP_BOARD={THIRD}",
+            "-DFINGERTIP_PICO_W=ON",
+        )
         run("cmake", "-G", "Ninja", "-S", cls.tree, "-B", cls.build, *settings)
 
     def test_it_is_built_and_runs_on_its_own_pins(self):
@@ -65,6 +70,11 @@ class ThirdBoard(unittest.TestCase):
         self.assertIn((1 << 15) - 1, done.recording["valid"])
         capture = {"capture": self.build / "none.ftr", "host_script": done.path("script")}
         emulate(TOOLS, emulator, board=PATTERN, image=image, scenario=rest, seconds=0.8, **capture)  # whose pins are others
+        bench = f"import {{ ImageBench }} from '{self.tree}/tests/emulated/harness/image_bench.mjs'; const b = new ImageBench("
+        tools = {"fingertip": str(TOOLS.fingertip), "command_frame": str(TOOLS.command_frame)}
+        bench += f"'{self.tree}/build', {json.dumps(tools)}, '{THIRD}'); b.stream(); const p = b.machine.chip.pins; b.end(); "
+        driven = run(TOOLS.node, "--input-type=module", "-e", bench + "console.log((p.high | p.low) >>> 23 & 1)")
+        self.assertEqual(driven.stdout, "0\n")  # of a Pico W
         self.assertIn("is empty", run(TOOLS.fingertip, "replay", capture["capture"], check=False).stderr)
 
     def test_the_host_builds_its_image_and_knows_its_pins(self):

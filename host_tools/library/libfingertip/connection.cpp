@@ -54,9 +54,10 @@ std::string name_of(const Found &found, Reach reach, const std::string &root) {
   return found.port;
 }
 
-Way only_one(const std::vector<Found> &found, Reach reach, const std::string &root, const char *none) {
+Way only_one(const std::vector<Found> &found, Reach reach, const std::string &root, const std::string &none) {
   if (found.empty()) {
-    throw Error(ErrorCode::no_fingertip, none);
+    const std::string boot_rom = find_boot_rom(root);
+    throw Error(ErrorCode::no_fingertip, none + (boot_rom.empty() ? "" : ", but " + boot_rom));
   }
   if (found.size() > 1) {
     throw Error(ErrorCode::several_fingertips,

@@ -49,15 +49,39 @@ std::string port_of(const fs::path &usb, const fs::path &root) {
   return "";
 }
 
+struct BootRom {
+  unsigned vendor, product;
+  const char *what;
+};
+constexpr BootRom BOOT_ROMS[] = {
+    {0x2e8a, 0x0003, "a Pico that waits for firmware: install it with `fingertip flash`"},
+    {0x2e8a, 0x000f, "a Pico 2 (RP2350): there is firmware for a Pico or a Pico W only"},
+};
+
+bool is_device(const fs::path &usb, unsigned vendor, unsigned product) {
+  return is_hex(file_text(usb / "idVendor"), vendor) && is_hex(file_text(usb / "idProduct"), product);
+}
+
 } // namespace
+
+std::string find_boot_rom(const std::string &root) {
+  std::error_code none;
+  for (const auto &entry : fs::directory_iterator(fs::path(root) / "sys/bus/usb/devices", none)) {
+    const BootRom *rom =
+        find_in(BOOT_ROMS, [&](const BootRom &each) { return is_device(entry.path(), each.vendor, each.product); });
+    if (rom) {
+      return rom->what;
+    }
+  }
+  return "";
+}
 
 std::vector<Found> find_usb(const std::string &root) {
   std::vector<Found> found;
   std::error_code none;
   for (const auto &entry : fs::directory_iterator(fs::path(root) / "sys/bus/usb/devices", none)) {
     const fs::path &usb = entry.path();
-    if (!is_hex(file_text(usb / "idVendor"), FINGERTIP_USB_VID) ||
-        !is_hex(file_text(usb / "idProduct"), FINGERTIP_USB_PID)) {
+    if (!is_device(usb, FINGERTIP_USB_VID, FINGERTIP_USB_PID)) {
       continue;
     }
     auto number = [&](const char *name) { return static_cast<unsigned>(to_u64(file_text(usb / name)).value_or(0)); };

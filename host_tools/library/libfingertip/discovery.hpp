@@ -26,6 +26,9 @@ struct Found {
  * except in tests. */
 std::vector<Found> find_usb(const std::string &root = "/");
 
+/* Of a board that runs its boot ROM, as BOOTSEL makes it: which, and what to do. Empty: there is none. */
+std::string find_boot_rom(const std::string &root = "/");
+
 /* The paths in the environment variable FINGERTIP_PORT, separated by colons. */
 std::vector<Found> find_in_environment();
 

@@ -94,7 +94,10 @@ class Flash(CliTest):
         del self.environment["FINGERTIP_PORT"]
         self.assertIn("unplug the Pico, hold its BOOTSEL button while plugging it in", self.error("flash", self.image))
         self.make_volume(board="RP2350")
-        self.assertIn("the loader of another chip (RP2350)", self.error("flash", self.image, "--volume", self.volume))
+        self.assertIn(
+            "another chip (RP2350); there is no firmware for a Pico 2 yet, take a Pico",
+            self.error("flash", self.image, "--volume", self.volume),
+        )
 
     def test_a_folder_that_is_no_boot_volume_is_refused_before_anything_happens(self):
         with self.device("loader=1") as device:

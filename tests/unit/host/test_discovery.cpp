@@ -34,7 +34,8 @@ protected:
     std::ofstream(usb / "product") << "Fingertip tactile sensor\n";
     std::ofstream(usb / "busnum") << "1\n";
     std::ofstream(usb / "devnum") << place.back() << "\n";
-    fs::create_directory_symlink(usb, root() + "/sys/bus/usb/devices/" + place);
+    std::error_code again;
+    fs::create_directory_symlink(usb, root() + "/sys/bus/usb/devices/" + place, again);
     if (!tty.empty()) {
       fs::create_directories(usb / (place + ":1.0") / "tty" / tty);
       std::ofstream(root() + "/dev/" + tty) << "";
@@ -77,6 +78,14 @@ TEST_F(FakeSystem, FindsOursAndNoOther) {
   EXPECT_EQ(way.port, found[0].port);
   EXPECT_EQ(way.serial, "E660583883265A2C");
   EXPECT_TRUE(way.found_by_usb);
+}
+
+TEST_F(FakeSystem, ABoardInItsBootRomIsNamed) {
+  EXPECT_EQ(error({}), "no fingertip found");
+  plug_in("1-1", "", "E0", false, "2e8a", "000f");
+  EXPECT_NE(error({}).find("no fingertip found, but a Pico 2 (RP2350): there is firmware for"), std::string::npos);
+  plug_in("1-1", "", "E0", false, "2e8a", "0003");
+  EXPECT_NE(error({}).find("no fingertip found, but a Pico that waits for firmware"), std::string::npos);
 }
 
 TEST_F(FakeSystem, WithoutADriverLibusb) {

@@ -94,7 +94,9 @@ public:
     if (!given.empty()) {
       auto board = loader_board(given);
       if (board && *board != "RPI-RP2") {
-        throw Error(given + ": the loader of another chip (" + *board + "); give that of an RP2040");
+        throw Error(given + ": the loader of another chip (" + *board + "); " +
+                    (*board == "RP2350" ? "there is no firmware for a Pico 2 yet, take a Pico or a Pico W"
+                                        : "give that of an RP2040"));
       }
       return board ? std::unique_ptr<Volume>(new Volume(given, false)) : nullptr;
     }
