@@ -13,10 +13,11 @@ from unittest import mock
 
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "report/measure", "report/shear", "python")]
+sys.path[:0] = [str(ROOT / "host_tools/report" / part) for part in ("shared", "measure", "shear", "../python", "../../tests/support")]
 import motion  # noqa: E402
 import static  # noqa: E402
 from contacts import Contacts  # noqa: E402
+from figures import assert_within  # noqa: E402
 
 BUILD = sys.argv.pop()
 CONTACTS = Contacts(BUILD)
@@ -81,10 +82,7 @@ class ShearStatic(unittest.TestCase):
         return {row[key]: row for row in self.found[table]}
 
     def test_limits(self):
-        for key, least, most in LIMITS:
-            with self.subTest(key):
-                self.assertGreaterEqual(self.found[key], least)
-                self.assertLessEqual(self.found[key], most)
+        assert_within(self, self.found, LIMITS)
 
     def test_a_load_moves_the_gaussian_by_its_share_of_the_thickness(self):
         without = {(row["pad"], row["load"]): row["location_without_p50_mm"] for row in self.found["taps"]}
@@ -124,12 +122,7 @@ class ShearStatic(unittest.TestCase):
     def test_all_of_it_is_written_and_drawn(self):
         self.assertEqual(self.done.returncode, 0, self.done.stderr)
         text = (self.out / "shear.md").read_text()
-        for title in (
-            "By pad and tangential force",
-            "Where the misses lie",
-            "Pads that end",
-            "Screws",
-        ):
+        for title in ("By pad and tangential force", "Where the misses lie", "Pads that end", "Screws"):
             self.assertIn(f"## {title}\n", text)
         self.assertGreater(len((self.out / "shear.png").read_bytes()), 50000)
 

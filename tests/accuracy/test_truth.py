@@ -12,12 +12,14 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/truth", "report/measure", "report/shared", "report/shear", "python")]
+REPORT = [str(ROOT / "host_tools/report" / part) for part in ("truth", "measure", "shared", "shear")]
+sys.path[:0] = [*REPORT, str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 import one_press  # noqa: E402
 import over_time  # noqa: E402
 import shear  # noqa: E402
 import truth  # noqa: E402
 import zero_and_gate  # noqa: E402
+from figures import assert_within  # noqa: E402
 from fingertip.files import InputError  # noqa: E402
 from measure import Measure  # noqa: E402
 
@@ -51,10 +53,7 @@ class TruthFit(unittest.TestCase):
         cls.found = run(150, 3)
 
     def test_goals(self):
-        for key, least, most in FIT_GOALS:
-            with self.subTest(key):
-                self.assertGreaterEqual(self.found[key], least)
-                self.assertLessEqual(self.found[key], most)
+        assert_within(self, self.found, FIT_GOALS)
 
     def test_four_iterations_do_what_more_do(self):
         medians = {}

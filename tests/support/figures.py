@@ -1,7 +1,15 @@
-"""Figures of tests, in a JSON file that several tests write to."""
+"""Figures of tests: their bounds, and a JSON file that several tests write to."""
 
 import json
 import pathlib
+
+
+def assert_within(case, found, bounds):
+    """bounds: (key, least, most) of each figure."""
+    for key, least, most in bounds:
+        with case.subTest(key):
+            case.assertGreaterEqual(found[key], least)
+            case.assertLessEqual(found[key], most)
 
 
 def add(path, figures, stale=()):
