@@ -103,6 +103,8 @@ qemu-system-x86_64 qemu-system-x86
 /bin/busybox busybox-static
 lsusb usbutils
 lintian lintian
+/usr/lib/python3/dist-packages/pcbnew.py kicad
+/usr/share/kicad/footprints kicad-footprints
 /usr/sbin/piuparts piuparts
 LIST
   case $1 in web | test | nightly | report) cat << 'LIST' ;; esac
