@@ -138,9 +138,8 @@ class Card:
         self._find_loose()
         self._solve()
         self._locate()
-        is_tilted = self._find_tilt()
-        is_thin = self._find_thickness()
-        self._weigh(is_thin, is_tilted)
+        self._find_tilt()
+        self._weigh(is_thin=self._find_thickness())
         self._assess_empty()
         self._assess_hold()
         self._assess_pulls()
@@ -332,7 +331,7 @@ class Card:
         slope, sd = np.hypot(*self.fit.slope), np.hypot(*self.fit.slope_sd)
         self._add("width_slope_percent", "width grows from the middle to an end by", "%", 100 * slope, 1)
         if not (slope > TILT_MIN and slope > TILT_SDS * sd):
-            return False
+            return
         axis = int(np.argmax(np.abs(self.fit.slope)))
         self._find(
             "tilted_skin",
@@ -340,7 +339,6 @@ class Card:
             f"The skin is thicker towards {'+' if self.fit.slope[axis] > 0 else '-'}{'xy'[axis]}: its response is wider there by "
             f"{100 * slope:.0f} % than in the middle, and as much narrower at the other end. Level the mould and cast it again, or clamp it evenly.",
         )
-        return True
 
     def _find_thickness(self):
         found = self.solution
@@ -360,7 +358,7 @@ class Card:
         )
         return True
 
-    def _weigh(self, is_thin, is_tilted):
+    def _weigh(self, is_thin):
         """By the stored calibration, or by the readings of a pad whose sensors measure the pressure on the base."""
         ratio, found = self._force_over_weight, self.solution
         if not self.is_calibrated or not ratio > 0:
@@ -368,9 +366,8 @@ class Card:
                 return
             ratio = 1 / (found["force_scale"] * found["force_ratio"] * READS_OF_FORCE)
         self._add("weight_ratio", "force by the readings, over the weight as given", "", ratio, 2)
-        # A calibration of another skin does not show the weight, nor does the one width that is fitted to a tilted skin: weights are then up to
-        # 1.09 times too heavy (seeds 853 and 961 to 964).
-        if not (is_thin if self.is_calibrated else is_tilted) and abs(ratio - 1) > WEIGHT_OFF_MAX:
+        # A calibration of another skin does not show the weight.
+        if not (is_thin and self.is_calibrated) and abs(ratio - 1) > WEIGHT_OFF_MAX:
             repair = (
                 "calibrate again, with --weight."
                 if self.is_calibrated
