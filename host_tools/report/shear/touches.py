@@ -124,7 +124,6 @@ class Judged:
         return {
             "claimed_percent": percent(self.claims(2.0)),
             "claimed_surely_percent": percent(self.claims(2.0 * np.sqrt(2.0))),
-            "claimed_unflagged_percent": percent(self.claims(2.0) & ~self.estimate["elongated"]),
         }
 
     def row(self, name):

@@ -64,7 +64,6 @@ GOALS = (
     ("remembered_force_p50_percent", "<=", 2),
     ("remembered_refused", "<=", 0),
     *((f"{kind}_cover_1sd_percent", "within", (55, 80)) for kind in OVER_TIME),
-    *((f"{kind}_silent_percent", "<=", 0.5) for kind in OVER_TIME),
     ("over_time_silent_percent_worst", "<=", 0.5),
     ("slow_force_error_percent", "<=", 2),
     ("false_contacts", "<=", 0),
