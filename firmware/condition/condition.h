@@ -1,9 +1,9 @@
 /* From absolute readings to pressure on the pad. Everything here works in seconds and pascals, at any rate from 0.1 Hz
  * to 1400 Hz and at any oversampling. ZERO.md has the picture, constants.h the figures.
  *
- * A frame's pressures are its readings less the zero of each sensor. From them the gate decides whether anything
- * touches. Every UPDATE_ms each sensor is updated (update.h): one pass over all that is remembered of it. Its
- * zero has two parts.
+ * A frame's pressures are its readings less the zero of each sensor, but for what has faded of the remainder. From
+ * them the gate decides whether anything touches. Every UPDATE_ms each sensor is updated (update.h): one pass over all
+ * that is remembered of it. Its zero has two parts.
  *
  * Level: what the sensor reads when nothing touches.
  * - Taken: the mean of ZERO_TARE_FRAMES readings without the smallest and the largest; at rates below 16 Hz of three

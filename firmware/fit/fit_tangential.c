@@ -30,8 +30,7 @@
 #define NEAR_ENDS 0.75f
 
 /* A contact is elongated if its elongation exceeds this share of the widest term's variance with t,
- * and ELONGATED_SURE standard deviations. The report shear counts them by object and tangential force.
- */
+ * and ELONGATED_SURE standard deviations: only where a pad ends near, as elsewhere LONG_MOST is no more. */
 #define ELONGATED_LEAST 0.07f
 #define ELONGATED_SURE 2.5f
 /* Larger where the pad ends near, which leaves residuals. */

@@ -198,8 +198,8 @@ struct wire_raw {
   uint32_t doubtful; /* bitmap: a measurement with a reason to doubt it; 0 in a held frame */
   int16_t temperature_cC; /* mean of the sensors, 0.01 degC; 0 until measured */
   uint8_t sensor_count; /* number of sensors, 1 to 32 */
-  /* of each sensor: absolute pressure, and the tare that is subtracted before the fit; both in
-   * 1/1024 Pa */
+  /* of each sensor: absolute pressure, and the zero, of which the fit subtracts what has not
+   * faded in this contact; both in 1/1024 Pa */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS];
   int32_t baseline_Pa_q10[FT_MAX_SENSORS];
 };

@@ -317,7 +317,7 @@ class Raw(NamedTuple):
     sensors: Annotated[int, Wire("n")]
     """number of sensors, 1 to 32"""
     readings: Annotated[tuple[int, ...], Wire("i", 2, each_sensor=True)]
-    """of each sensor: absolute pressure, and the tare that is subtracted before the fit; both in 1/1024 Pa"""
+    """of each sensor: absolute pressure, and the zero, of which the fit subtracts what has not faded in this contact; both in 1/1024 Pa"""
 
 
 class Info(NamedTuple):

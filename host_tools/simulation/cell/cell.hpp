@@ -38,7 +38,7 @@ public:
   Cell(const Cell &) = delete;
   Cell &operator=(const Cell &) = delete;
 
-  // Advances by this time, in as many whole steps as are due, some 15 us each; the gripper's width is as now.
+  // Advances by this time, in as many whole steps as are due; the gripper's width is as now.
   void run(double seconds, double width_mm, const KindOfGrasp::Inputs &inputs);
 
   double force_N(std::size_t finger) const;

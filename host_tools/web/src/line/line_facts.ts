@@ -275,9 +275,9 @@ export interface Raw extends Header {
   temperature_cC: number;
   /** number of sensors, 1 to 32 */
   sensor_count: number;
-  /** of each sensor: absolute pressure, and the tare that is subtracted before the fit; both in 1/1024 Pa */
+  /** of each sensor: absolute pressure, and the zero, of which the fit subtracts what has not faded in this contact; both in 1/1024 Pa */
   pressure_Pa_q10: Float64Array;
-  /** of each sensor: absolute pressure, and the tare that is subtracted before the fit; both in 1/1024 Pa */
+  /** of each sensor: absolute pressure, and the zero, of which the fit subtracts what has not faded in this contact; both in 1/1024 Pa */
   baseline_Pa_q10: Float64Array;
 }
 /** Identity, settings and stored data of a fingertip. Without its capability a field is 0 (None or NaN in Python). */
