@@ -5,7 +5,10 @@ import json
 import pcb_check
 import sheet
 
-ORDERED = {"U": "sensor", "C": "capacitor", "A": "pico"}  # key of parts.json by a name's first letter; R has its ohms
+# Keys of parts.json by a name's first letter; R has its ohms.
+ORDERED = {"U": "sensor", "C": "capacitor", "M": "multiplexer", "X": "connector", "A": "pico"}
+# In the base plate: screws and solder leave more play than a template; pockets have theirs around the pads of a part.
+HOLE_mm, PLAY_mm, POCKET_mm = 3.7, 0.3, 1.1
 
 
 def bom(board, listed, part_of):
@@ -20,30 +23,47 @@ def bom(board, listed, part_of):
 
 def placement(board):
     """From the board's middle, y up; turned counter-clockwise, seen from the part's side."""
-    rows = [
-        f"{name},{sheet.number(x)}mm,{sheet.number(-y)}mm,{'Bottom' if back else 'Top'},{(-turn if back else turn) % 360}"
-        for name, (x, y, turn, back, _) in board.parts.items()
-        if name[0] in "UCRA"
-    ]
-    return "\n".join(["Designator,Mid X,Mid Y,Layer,Rotation", *rows]) + "\n"
+    rows = ["Designator,Mid X,Mid Y,Layer,Rotation"]
+    for name, (x, y, turn, back, _) in board.parts.items():
+        if name[0] in "UCRMXA":
+            side = f"Bottom,{(180 - turn) % 360}" if back else f"Top,{turn}"
+            rows.append(f"{name},{sheet.number(x)}mm,{sheet.number(-y)}mm,{side}")
+    return "\n".join(rows) + "\n"
+
+
+def plate(board, middle):
+    """The base plate that the board needs, from below: a hole for each sensor, and a pocket for what else is on the front."""
+    (left, top), (right, bottom) = board.outline
+    words = f"base plate, from below: holes {HOLE_mm} mm for sensors, pockets {POCKET_mm} mm deep"
+    lines = [sheet.rectangle(middle, 0, right - left, bottom - top), sheet.text(middle + left, top - 2, words)]
+    lines += [sheet.circle(middle - x, y, diameter) for x, y, diameter in board.holes]
+    for part, (x, y, _, back, _) in board.parts.items():
+        if part[0] == "U":
+            lines.append(sheet.rectangle(middle - x, y, HOLE_mm, HOLE_mm))
+        elif part[0] in "CR" and not back:
+            ends = [board.pads[part, pad] for pad in "12"]
+            w, h = (abs(ends[0][axis] - ends[1][axis]) + ends[0][axis + 2] + 2 * PLAY_mm for axis in (0, 1))
+            lines.append(sheet.rectangle(middle - x, y, w, h, "cut"))
+    return lines
 
 
 def drawn(board, name):
-    """Both sides at 1:1, the back as one sees it: the assembly drawing."""
+    """Both sides at 1:1, the back as one sees it: the assembly drawing. And the base plate."""
     (left, top), (right, bottom) = board.outline
     lines = []
     for back, words in ((False, "front: sensors"), (True, "back")):
         middle, side, layer = (right - left + 12) * back, -1 if back else 1, "FB"[back] + ".Cu"
         lines += [sheet.rectangle(middle, 0, right - left, bottom - top), sheet.text(middle + left, top - 2, words)]
         lines += [sheet.circle(middle + side * x, y, diameter) for x, y, diameter in board.holes]
-        for x0, y0, x1, y1, width, _ in (track for track in board.tracks if track[-1] == layer):
+        for x0, y0, x1, y1, width, *_ in (track for track in board.tracks if track[-1] == layer):
             way = f"M{sheet.number(middle + side * x0)} {sheet.number(y0)}L{sheet.number(middle + side * x1)} {sheet.number(y1)}"
             lines.append(f'  <path class="measure" style="stroke-width: {width:g}; opacity: 0.5" d="{way}"/>')
         shown = {part: place for part, place in board.parts.items() if place[3] == back}
         lines += [sheet.rectangle(middle + side * x, y, w, h, "cut") for (part, _), (x, y, w, h, _) in board.pads.items() if part in shown]
         lines += [sheet.text(middle + side * x, y + 0.8, part, anchor="middle") for part, (x, y, *_) in shown.items()]
+    lines += plate(board, 2 * (right - left + 12))
     lines += sheet.ruler(left, bottom + 8)
-    return sheet.sheet(f"Circuit board of {name}, both sides, 1:1", left - 4, top - 8, 2 * (right - left) + 20, bottom - top + 22, lines)
+    return sheet.sheet(f"Circuit board of {name}, both sides, 1:1", left - 4, top - 8, 3 * (right - left) + 32, bottom - top + 22, lines)
 
 
 def files(path, listed, part_of):

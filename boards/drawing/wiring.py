@@ -96,6 +96,11 @@ def levels(board, strip):
     return ["3V3" if bits >> bit & 1 else "GND" for bit in (2, 1, 0)]
 
 
+def cable(board):
+    """Of a multiplexed circuit board, by pin of its connector: 1 to 8."""
+    return ["GND", "3V3", "SDA", "SCL", *(f"RESET{strip}" for strip in range(board.strips)), *["GND"] * (4 - board.strips)]
+
+
 def table(board):
     """Markdown: every wire of the Pico, and what chooses an address."""
     w, pads = board.wiring, SENSOR_PADS
@@ -123,7 +128,8 @@ def table(board):
     for strip in range(board.strips):
         sensors = board.sensors_of(strip)
         page += f"| {strip} | 0x{board.mux_address(strip):02x} | {', '.join(levels(board, strip))} | 0 to {len(sensors) - 1}: SDA and SCL of sensors {sensors[0]} to {sensors[-1]} |\n"
-    return page
+    wires = ", ".join(f"{pin + 1} {wire}" for pin, wire in enumerate(cable(board)))
+    return f"{page}\nOn a circuit board the connector has, from pin 1: {wires}.\n"
 
 
 def parts(board):

@@ -23,6 +23,7 @@ test_lines          the same in tests/
 private_words       words and phrases of this house that PRIVATE_WORDS replaces, in product files, CHANGELOG.md apart
 unformatted_files   sources that their formatter would change, by build/report/formatting.json if it is there
 longest_function_lines  lines of the longest function of firmware/ and boards/
+board_lines         lines of the circuit boards' generator and of its checks
 app_ifs             conditional blocks (#if) in the source of firmware/app that has most, the list of stages apart
 """
 
@@ -52,11 +53,16 @@ LIMITS = {
     "private_words": (150, 150),
     "unformatted_files": (0, 0),
     "longest_function_lines": (60, 60),
+    "board_lines": (900, 1001),
     "app_ifs": (1, 1),
 }
 APART = ("firmware/fit/", "firmware/condition/")  # from longest_file
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}
 TEXTS = SOURCES | {".md", ".txt", ".json", ".html", ".in", ".1", ".bash", ".fish", ".cfg", ".msg", ""}
+CIRCUIT_BOARD = (
+    ("boards/drawing/", "tests/checks/"),
+    {"layout.py", "route.py", "board_file.py", "fabricate.py", "pcb.py", "pcb_check.py", "kicad.py", "test_pcb.py"},
+)
 CODE = {".c", ".h", ".cpp", ".hpp", ".py", ".js", ".mjs", ".ts", ".mts"}
 STAGES = "firmware/app/stages.c"  # lists the stages of each scene
 # Words that readers from elsewhere do not know in this sense, and what the field writes instead.
@@ -216,6 +222,9 @@ def measure(root):
     code = written(root, CODE)
     figures["product_lines"] = sum(text.count("\n") for name, text in code.items() if not name.startswith("tests/"))
     figures["test_lines"] = sum(text.count("\n") for name, text in code.items() if name.startswith("tests/"))
+    figures["board_lines"] = sum(
+        code[name].count("\n") for name in code if name.startswith(CIRCUIT_BOARD[0]) and name.split("/")[-1] in CIRCUIT_BOARD[1]
+    )
     words = private_words(files)
     figures["private_words"] = sum(words.values())
     on_chip = {name: text for name, text in code.items() if name.startswith(("firmware/", "boards/")) and name.endswith((".c", ".h"))}
@@ -229,6 +238,7 @@ def measure(root):
     found |= {
         "product_lines": ("all", []),
         "test_lines": ("all", []),
+        "board_lines": ("all", []),
         "longest_function_lines": (slowest, [slowest]),
         "app_ifs": (most, [most]),
         "private_words": ("all", sorted(words, key=words.get, reverse=True)[:8]),

@@ -1,16 +1,23 @@
-"""KiCad's judgement of circuit boards: prints for each .kicad_pcb what its rule check counts, and the pads that lie elsewhere than those of KiCad's own
+"""KiCad's judgement of circuit boards: prints for each .kicad_pcb what its rule check counts, and the pads that differ from those of KiCad's own
 parts, which KiCad turns and flips: mirrored parts show in nothing else."""
 
+import json
 import pathlib
-import re
 import sys
 
 import pcbnew
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "boards/drawing"))
+import fabricate  # noqa: E402
+
 LIBRARY = pathlib.Path("/usr/share/kicad/footprints")
 
 
-def pads_off(board):
+def pads_of(part):
+    return sorted((pad.GetName(), pad.GetCenter().x, pad.GetCenter().y, *pad.GetSize()) for pad in part.Pads())
+
+
+def lands_off(board):
     off, scratch = 0, pcbnew.BOARD()  # flipping a part that is on no board crashes
     for ours in board.Footprints():
         library = LIBRARY / f"{ours.GetFPID().GetLibNickname()}.pretty"
@@ -21,14 +28,11 @@ def pads_off(board):
             if ours.IsFlipped():
                 other.Flip(ours.GetPosition(), True)
             other.SetOrientation(ours.GetOrientation())
-            places = [sorted((pad.GetName(), pad.GetCenter().x, pad.GetCenter().y) for pad in part.Pads()) for part in (other, ours)]
-            off += sum(max(abs(a[1] - b[1]), abs(a[2] - b[2])) > 1000 for a, b in zip(*places, strict=True))  # nm
+            pairs = zip(pads_of(other), pads_of(ours), strict=True)
+            off += sum(a[0] != b[0] or max(abs(x - y) for x, y in zip(a[1:], b[1:], strict=True)) > 1000 for a, b in pairs)  # nm
     return off
 
 
 for path in sys.argv[1:]:
-    board = pcbnew.LoadBoard(path)
-    pcbnew.ZONE_FILLER(board).Fill(board.Zones())
-    pcbnew.WriteDRCReport(board, f"{path}.txt", pcbnew.EDA_UNITS_MILLIMETRES, True)
-    counts = re.findall(r"\*\* Found (\d+)", pathlib.Path(f"{path}.txt").read_text(encoding="utf-8"))
-    print(sum(map(int, counts)) + pads_off(board))
+    board = fabricate.filled(path)
+    print(json.dumps(fabricate.judged(board, f"{path}.txt") | {"lands_off": lands_off(board)}))

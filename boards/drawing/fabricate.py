@@ -1,0 +1,82 @@
+#!/usr/bin/python3
+"""What a board house wants of each circuit board, by KiCad's own plotter: Gerbers and drill files in one zip, list of parts, placement file.
+
+fabricate.py FOLDER    writes FOLDER/<board>/ for each boards/<board>/pcb, and prints what KiCad's rule check finds: it shall be nothing
+
+Needs KiCad 6 (Debian: kicad, kicad-footprints). The same board gives the same bytes: dates and versions are left out.
+"""
+
+import json
+import pathlib
+import re
+import shutil
+import sys
+import tempfile
+import zipfile
+
+import pcbnew
+
+LAYERS = ("F_Cu", "B_Cu", "F_Mask", "B_Mask", "F_Paste", "B_Paste", "F_SilkS", "B_SilkS", "Edge_Cuts")
+DATED = re.compile(
+    r"^(G04 Created by KiCad|%TF\.(Creation|Generation|ProjectId)|; DRILL file|; #@! TF\.(Creation|Generation)).*\n", re.MULTILINE
+)
+
+
+def filled(path):
+    board = pcbnew.LoadBoard(str(path))
+    pcbnew.ZONE_FILLER(board).Fill(board.Zones())
+    return board
+
+
+def judged(board, report):
+    """What KiCad's rule check counts. report: the file that its words go to."""
+    pcbnew.WriteDRCReport(board, str(report), pcbnew.EDA_UNITS_MILLIMETRES, True)
+    violations, unconnected, footprints = map(int, re.findall(r"\*\* Found (\d+)", pathlib.Path(report).read_text(encoding="utf-8")))
+    return {"drc_violations": violations + footprints, "unconnected": unconnected}
+
+
+def plotted(board, folder):
+    """{name: text} of Gerbers and drill files. Their origin is the pad's middle."""
+    plotter = pcbnew.PLOT_CONTROLLER(board)
+    options = plotter.GetPlotOptions()
+    options.SetOutputDirectory(str(folder))
+    options.SetUseAuxOrigin(True)
+    options.SetUseGerberX2format(True)
+    options.SetIncludeGerberNetlistInfo(True)
+    for layer in LAYERS:
+        plotter.SetLayer(getattr(pcbnew, layer))
+        plotter.OpenPlotfile(layer, pcbnew.PLOT_FORMAT_GERBER, layer)
+        plotter.PlotLayer()
+    plotter.ClosePlot()
+    writer = pcbnew.EXCELLON_WRITER(board)
+    writer.SetOptions(False, False, board.GetDesignSettings().GetAuxOrigin(), False)
+    writer.SetFormat(True)  # metric; without it KiCad 6.0.11 writes hundredths
+    writer.CreateDrillandMapFilesSet(str(folder), True, False)
+    return {path.name: DATED.sub("", path.read_text(encoding="utf-8")) for path in sorted(pathlib.Path(folder).iterdir())}
+
+
+def main(argv):
+    if len(argv) != 1:
+        print(__doc__, file=sys.stderr)
+        return 2
+    wrong = 0
+    for path in sorted(pathlib.Path(__file__).resolve().parents[1].glob("*/pcb/*.kicad_pcb")):
+        folder = pathlib.Path(argv[0]) / path.parents[1].name
+        folder.mkdir(parents=True, exist_ok=True)
+        board = filled(path)
+        with tempfile.TemporaryDirectory() as scratch, zipfile.ZipFile(folder / f"{path.stem}-gerbers.zip", "w") as out:
+            for name, text in plotted(board, scratch).items():
+                out.writestr(zipfile.ZipInfo(name), text)
+            report = pathlib.Path(scratch) / "rule-check.txt"
+            found = judged(board, report)
+            if any(found.values()):
+                wrong += 1
+                print(report.read_text(encoding="utf-8"), file=sys.stderr)
+        for table in path.parent.glob("*.csv"):
+            shutil.copy(table, folder)
+        print(f"{folder}: {json.dumps(found)}")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
