@@ -116,9 +116,9 @@ def usable_of(readings):
 
 
 class Measure(Library):
-    def __init__(self, build):
+    def __init__(self, build, name="measure"):
         self.build = pathlib.Path(build).resolve()
-        super().__init__(self.build / "measure/libmeasure.so")
+        super().__init__(self.build / f"measure/lib{name}.so")
         self.no_own = np.zeros((0, 0), self.records.get("fit_own", "V12"))
 
     @property
