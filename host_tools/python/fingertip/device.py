@@ -37,8 +37,7 @@ Given = Mapping[str, float | str | None]
 
 def _number(setting: Setting, value: float | str | None) -> float | None:
     """Of what is given, which may be a word."""
-    if value is None or not setting.words:
-        assert not isinstance(value, str)
+    if value is None or not (setting.words or isinstance(value, str)):
         return value
     if value not in setting.words:
         raise BadValueError(f"{setting.argument} {value!r} is unknown; give {setting.give}")
@@ -203,6 +202,9 @@ class Fingertip(Settable):
         self._notify()
 
     # What it is
+
+    def __repr__(self) -> str:
+        return f"<Fingertip {self.serial} on {self.info.board}, {self.description}{', closed' if self.is_closed else ''}>"
 
     @property
     def serial(self) -> str:

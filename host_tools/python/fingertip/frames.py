@@ -1,5 +1,6 @@
 """Frames, one by one and as arrays."""
 
+import difflib
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -165,8 +166,14 @@ class Block(BlockQuantities):
         return len(self.frame)
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        values: npt.NDArray[Any] = getattr(self, name)
+        if not isinstance(values := getattr(self, name, None), np.ndarray):
+            near = difflib.get_close_matches(name, self._names, cutoff=0.4)
+            raise KeyError(f"a block has no {name}; {'did you mean ' + near[0] if near else 'it has ' + ', '.join(self._names)}")
         return values
+
+    def __repr__(self) -> str:
+        seconds = float(np.ptp(self.t_us)) / 1e6 if len(self) else 0.0
+        return f"<Block of {len(self)} frames in {seconds:.2f} s, {int(self.has_contact.sum())} with a contact packet>"
 
     def flag(self, bits: int) -> BoolArray:
         """Where any of these flags is set."""

@@ -50,7 +50,7 @@ def _port_error(path: str, error: OSError) -> PortError:
     if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO) or "FileNotFoundError" in text:
         return NoSuchPortError(f"{path}: no such port")
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in text or (sys.platform == "win32" and "PermissionError" in text):
-        return PortInUseError(f"{path}: in use by another program")
+        return PortInUseError(f"{path}: in use by another program, or by a Fingertip of this one that was not closed")
     if code in (errno.EACCES, errno.EPERM):
         return PermissionDeniedError(f"{path}: permission denied")
     if code == errno.ENOTTY or "Could not configure port" in text:

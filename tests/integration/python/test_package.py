@@ -186,6 +186,9 @@ class Streaming(DeviceTest):
         with self.device(), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
             block = tip.read_block(50)
             self.assertEqual((len(block), block.sensors_Pa.shape, block.tare_Pa.shape), (50, (50, 15), (50, 15)))
+            self.assertRaisesRegex(KeyError, "no force; did you mean force_N", block.__getitem__, "force")
+            self.assertRaisesRegex(KeyError, "no len; it has frame, run, ", block.__getitem__, "len")
+            self.assertRegex(repr([block, tip]), r"<Block of 50 frames in 0\.\d\d s, 50 with .*, <Fingertip \w+ on \w+, .*>")
             np.testing.assert_array_equal(np.diff(block.frame), 1)
             self.assertTrue(np.isnan(block.sensors_Pa[:, 0]).all() and np.isfinite(block.sensors_Pa[:, 1:]).all())
             np.testing.assert_allclose(np.hypot(block.x_mm / 8, block.y_mm / 16), 1, rtol=1e-4)
@@ -335,6 +338,7 @@ class Commands(DeviceTest):
             sent = tip.read_info()
             for wrong, said in (
                 ({"osr": 300}, "256, 512"),
+                ({"rate_Hz": "max"}, "rate_Hz 'max' is unknown; give"),
                 ({"prior_width_mm": 1}, "needs"),
                 ({}, "nothing to set"),
                 ({"osr": 512, "rate_Hz": -1}, "rate_Hz -1"),

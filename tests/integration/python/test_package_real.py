@@ -51,7 +51,7 @@ class Streaming(DeviceTest):
 
     def test_one_port_one_program(self):
         with self.device(), Fingertip(self.port, timeout_s=PATIENCE_s):
-            with self.assertRaisesRegex(fingertip.PortInUseError, "in use by another program"):
+            with self.assertRaisesRegex(fingertip.PortInUseError, "in use by another program, or by a Fingertip of this one"):
                 Fingertip(self.port)
 
     def test_asyncio(self):
