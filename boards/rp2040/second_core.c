@@ -75,8 +75,10 @@ bool port_worker_start(bool (*serve)(void *context), void *context) {
   work.context = context;
   REG32_CLEAR(PSM_FRCE_OFF) = PSM_PROC1;
   const bool started = launch();
-  if (!started)
+  if (!started) {
     port_worker_stop();
+    port_event(CRASH_EVENT_WORKER, 1);
+  }
   return started;
 }
 

@@ -1,6 +1,7 @@
 #include "app/shapes_stage.h"
 
 #include "common/contact_flags.h"
+#include "port/port.h"
 
 #include <string.h>
 
@@ -49,6 +50,7 @@ void shapes_stage_ask(struct shapes_stage *own, const struct location_stage *loc
   own->job.question.parts = shapes_parts(jobs->pace_us);
   own->begins = false;
   worker_ask(&jobs->worker[JOB_SHAPES]);
+  port_worker_wake();
 }
 
 void shapes_stage_judge_tangential(const struct shapes_stage *own, struct findings *found) {

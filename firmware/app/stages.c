@@ -347,7 +347,17 @@ enum ft_status stages_obey(struct stages *stages, const struct wire_packet *comm
   }
 }
 
+static uint32_t second_processor(const struct stages *stages) {
+#if FT_WITH_TANGENTIAL
+  return stages->jobs.has_processor ? WIRE_CAPABILITY_SECOND : 0;
+#else
+  (void)stages;
+  return 0;
+#endif
+}
+
 void stages_put_info(const struct stages *stages, struct wire_info *info) {
+  info->capabilities |= second_processor(stages);
 #if FT_WITH_FIT
   const struct location_stage *location = &stages->location;
   info->fit_iterations = location->settings.iterations;
@@ -375,6 +385,7 @@ void stages_put_info(const struct stages *stages, struct wire_info *info) {
 }
 
 void stages_put_health(const struct stages *stages, struct wire_health *health) {
+  health->capabilities |= second_processor(stages);
 #if FT_WITH_FIT
   health->fit_failures = stages->location.failures;
 #endif

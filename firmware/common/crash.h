@@ -49,7 +49,7 @@ enum crash_event {
   CRASH_EVENT_SENSORS, /* others answer than before */
   CRASH_EVENT_BUS,     /* timeouts of the sensor bus; detail: number in a second */
   CRASH_EVENT_SKIPPED, /* frames that were not taken; detail: number in a second */
-  CRASH_EVENT_WORKER,  /* the second processor did not answer, and was started again */
+  CRASH_EVENT_WORKER,  /* the second processor did not answer, and was started again; detail: 1 if it does not start */
 };
 
 enum { CRASH_EVENTS = 8 };

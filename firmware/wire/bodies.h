@@ -59,6 +59,9 @@ enum wire_capability {
   WIRE_CAPABILITY_RAW_STREAM = 1 << 2, /* raw packets */
   WIRE_CAPABILITY_TANGENTIAL = 1 << 3, /* tangential force, where the pad's profile is stored */
   WIRE_CAPABILITY_SYNC = 1 << 4, /* sync packets, and the command that sets the sync pin */
+  /* the second processor runs, now; without it the first does its work, with the same results at
+   * fewer frames a second */
+  WIRE_CAPABILITY_SECOND = 1 << 5,
 };
 
 /* The result code of an acknowledgement. */

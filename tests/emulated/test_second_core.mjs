@@ -6,11 +6,19 @@
  */
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { has, killedAt, SecondCoreBench, SHAPE_VALID, TANGENTIAL_LATE, TANGENTIAL_VALID } from './harness/second_core.mjs';
+import {
+  EVENT_WORKER,
+  has,
+  killedAt,
+  SecondCoreBench,
+  SHAPE_VALID,
+  TANGENTIAL_LATE,
+  TANGENTIAL_VALID,
+  withoutCore1,
+} from './harness/second_core.mjs';
 
 const [folder, fingertip, command_frame] = process.argv.slice(2);
 const tools = { fingertip, command_frame };
-const EVENT_WORKER = 10; // crash.h
 const KILLS = 10; // a nightly test has 1000
 
 const newBench = () => new SecondCoreBench(folder, tools);
@@ -90,6 +98,13 @@ for (const [when, isSo] of [
     assert.deepEqual([bench.machine.reboots, bench.lost, bench.second.state], [0, 0, 'runs']);
   });
 }
+
+test('a core 1 that is gone for good, or never starts, is reported, and the estimates go on', () => {
+  const { frames, late, estimates, reported } = withoutCore1(folder, tools);
+  assert.ok(frames > 50, `${frames}`);
+  assert.deepEqual([late, estimates], [0, frames]);
+  assert.deepEqual(reported, ['gone', 'never started']);
+});
 
 test('a reset by the watchdog ends core 1, and it is started again; the record tells that it had been late', () => {
   const bench = newBench();

@@ -56,6 +56,7 @@ def same_bits(build):
     ("core1_hangs", "<=", 0),
     ("core1_frames_lost", "<=", 0),
     ("core1_unflagged", "<=", 0),
+    ("core1_absent_reported", ">=", 1),
     ("core1_soak_hours", ">=", KILLING_h),
     ("core1_soak_lost", "<=", 0),
     ("core1_soak_hangs", "<=", 0),
@@ -67,10 +68,10 @@ def second_core(build):
         folder = image_of(build.parent, PARALLEL).parent
         return json.loads(run("node", EMULATED / "harness/kill_figures.mjs", folder, *tools_of(build), *what))
 
-    jobs = {"kills": functools.partial(one, "kills", KILLS)}
+    jobs = {"kills": functools.partial(one, "kills", KILLS), "absent": functools.partial(one, "absent")}
     jobs |= {seed: functools.partial(one, "soak", KILLING_h / CHIPS, seed) for seed in range(1, CHIPS + 1)}
     found = in_parallel(jobs)
-    killed = found.pop("kills")
+    killed = found.pop("kills") | found.pop("absent")
     total = {name: sum(chip[name] for chip in found.values()) for name in found[1]}
     return killed | {
         "core1_soak_chips": CHIPS,

@@ -235,6 +235,7 @@ inline constexpr Word capabilities[] = {
     {WIRE_CAPABILITY_RAW_STREAM, "raw"},
     {WIRE_CAPABILITY_TANGENTIAL, "tangential"},
     {WIRE_CAPABILITY_SYNC, "sync"},
+    {WIRE_CAPABILITY_SECOND, "second"},
 };
 inline constexpr Word stored[] = {
     {WIRE_STORED_CALIBRATION, "calibration"},

@@ -84,6 +84,7 @@ class Capability(enum.IntFlag):
     RAW_STREAM = 1 << 2  #: raw packets
     TANGENTIAL = 1 << 3  #: tangential force, where the pad's profile is stored
     SYNC = 1 << 4  #: sync packets, and the command that sets the sync pin
+    SECOND = 1 << 5  #: the second processor runs, now; without it the first does its work, with the same results at fewer frames a second
 
 
 class Stored(enum.IntFlag):
@@ -456,10 +457,12 @@ class Crash(NamedTuple):
     """parts without progress, for kind 3: bit 0 main loop, 1 scan, 2 USB, 3 interrupts"""
     events: Annotated[tuple[int, ...], Wire("B", 8)]
     """the last events, newest first: 0 none, 1 start, 2 command, 3 port closed, 4 bus asleep, 5 awake, 6 stored, 7 other sensors answer, 8
-    timeouts on the sensor bus, 9 frames skipped, 10 the second processor started again
+    timeouts on the sensor bus, 9 frames skipped, 10 the second processor did not answer, and was started again
     """
     event_details: Annotated[tuple[int, ...], Wire("B", 8)]
-    """of these: type of the command; 1 if storing failed; number of timeouts or frames in a second"""
+    """of these: type of the command; 1 if storing failed; 1 if the second processor does not start; number of timeouts or frames in a
+    second
+    """
     r0: Annotated[int, Wire("I")]
     """registers; all 0 if they could not be recorded"""
     r1: Annotated[int, Wire("I")]

@@ -96,7 +96,7 @@ std::string event_text(unsigned code, unsigned detail) {
       {CRASH_EVENT_STORED, detail == 0 ? "stored" : "could not store"},
       {CRASH_EVENT_SENSORS, "other sensors answer"},
       {CRASH_EVENT_BUS, "timeouts on the sensor bus" + in_a_second},
-      {CRASH_EVENT_WORKER, "second processor started again"},
+      {CRASH_EVENT_WORKER, detail == 0 ? "second processor started again" : "second processor does not start"},
       {CRASH_EVENT_SKIPPED, "frames skipped" + in_a_second}};
   const auto *found = find_in(texts, [&](const auto &each) { return each.first == code; });
   return found ? found->second : "event " + std::to_string(code) + "." + std::to_string(detail);

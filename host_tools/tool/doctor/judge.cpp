@@ -390,6 +390,10 @@ private:
     add(busy ? Verdict::warn : Verdict::ok, "processor", text,
         busy ? "choose a larger osr or a lower rate; missing sensors make the fit slower" : "");
     bool is_known = wiring_.has_value();
+    if (is_known && (now.capabilities & WIRE_CAPABILITY_TANGENTIAL) && !(now.capabilities & WIRE_CAPABILITY_SECOND)) {
+      add(Verdict::bad, "processor", "the second one does not run: the first does its work, at fewer frames a second",
+          "power it off and on; if it stays, replace the Pico");
+    }
     bool deep = is_known ? now.stack_free_bytes < STACK_FREE_MIN_bytes : now.stack_free_bytes == 0;
     add(now.stack_free_bytes == 0 ? Verdict::bad
         : deep                    ? Verdict::warn

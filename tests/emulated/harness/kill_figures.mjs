@@ -3,8 +3,9 @@
  *
  * usage: kill_figures.mjs FOLDER_OF_IMAGE FINGERTIP COMMAND_FRAME kills COUNT        at so many instants of a frame
  *        kill_figures.mjs FOLDER_OF_IMAGE FINGERTIP COMMAND_FRAME soak HOURS SEED    now and then, for so long
+ *        kill_figures.mjs FOLDER_OF_IMAGE FINGERTIP COMMAND_FRAME absent            for good, and at a start
  */
-import { killedAt, soaked } from './second_core.mjs';
+import { killedAt, soaked, withoutCore1 } from './second_core.mjs';
 
 function killed({ kills, reboots, lost }) {
   const number = (what) => kills.filter(what).length;
@@ -20,5 +21,9 @@ function killed({ kills, reboots, lost }) {
 
 const [folder, fingertip, command_frame, kind, amount, seed] = process.argv.slice(2);
 const tools = { fingertip, command_frame };
-const found = kind === 'kills' ? killed(killedAt(folder, tools, Number(amount))) : soaked(folder, tools, Number(amount), Number(seed));
+const found = {
+  kills: () => killed(killedAt(folder, tools, Number(amount))),
+  soak: () => soaked(folder, tools, Number(amount), Number(seed)),
+  absent: () => ({ core1_absent_reported: Number(withoutCore1(folder, tools).reported.length === 2) }),
+}[kind]();
 process.stdout.write(`${JSON.stringify(found)}\n`);

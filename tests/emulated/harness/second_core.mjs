@@ -8,6 +8,8 @@ import { CrashBench, split } from './crash_bench.mjs';
 const CONTACT = 0x01;
 // contact_flags.h
 export const [HELD, TANGENTIAL_VALID, TANGENTIAL_LATE, SHAPE_VALID] = [1 << 6, 1 << 20, 1 << 25, 1 << 26];
+export const EVENT_WORKER = 10; // crash.h
+const SECOND = 1 << 5; // of the capabilities, line.toml
 const PRESS_s = 0.6;
 
 /** A round press of some 5 N between the sensors. */
@@ -88,6 +90,35 @@ export function killedAt(folder, tools, count) {
     });
   }
   return { kills, reboots: bench.machine.reboots, lost: bench.lost, bench };
+}
+
+/** Core 1 goes away for good: 100 ms of frames, and when health and the record of a crash report it; also after a start without it. */
+export function withoutCore1(folder, tools) {
+  const bench = new SecondCoreBench(folder, tools);
+  const kind = Object.getPrototypeOf(bench.second);
+  const { powerUp } = kind;
+  const runs = () => (bench.health().capabilities & SECOND) !== 0;
+  assert.ok(runs());
+  try {
+    kind.powerUp = () => {};
+    bench.second.powerDown();
+    bench.run(AFTER_ms);
+    bench.frames();
+    bench.run(100);
+    const frames = bench.frames();
+    const reported = ['gone', 'never started'].filter(() => {
+      const health = !runs();
+      bench.patch('app_run', 'fee7'); // b .
+      bench.untilReset();
+      const [, detail] = bench.crash().events.find(([code]) => code === EVENT_WORKER) ?? [];
+      bench.received = [];
+      bench.stream();
+      return health && detail === 1;
+    });
+    return { frames: frames.length, late: has(frames, TANGENTIAL_LATE), estimates: has(frames, TANGENTIAL_VALID), reported };
+  } finally {
+    kind.powerUp = powerUp;
+  }
 }
 
 const PAUSE_ms = [25, 2000];

@@ -196,6 +196,8 @@ const Case CASES[] = {
        f.rest->sensors.clear();
        f.info->capabilities &= ~static_cast<std::uint32_t>(WIRE_CAPABILITY_RAW_STREAM);
      }},
+    {bad, "processor", "the second one does not run", 0,
+     [](Facts &f) { f.after->capabilities |= static_cast<std::uint32_t>(WIRE_CAPABILITY_TANGENTIAL); }},
     {warn, "drift", "-3.0 Pa/s", 0x20, [](Facts &f) { drift(f, -3, 0.05); }},
     {warn, "drift", "all sensors together", 0, [](Facts &f) { f.rest->common_drift->Pa_per_s = 3; }},
     {warn, "zero", "something touches the pad", 0,

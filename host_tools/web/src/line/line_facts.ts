@@ -43,6 +43,7 @@ export const Capability = {
   RAW_STREAM: 1 << 2,
   TANGENTIAL: 1 << 3,
   SYNC: 1 << 4,
+  SECOND: 1 << 5,
 } as const;
 /** What a fingertip keeps without power. */
 export const Stored = {
@@ -465,9 +466,9 @@ export interface Crash extends Header {
   activity: number;
   /** parts without progress, for kind 3: bit 0 main loop, 1 scan, 2 USB, 3 interrupts */
   stuck: number;
-  /** the last events, newest first: 0 none, 1 start, 2 command, 3 port closed, 4 bus asleep, 5 awake, 6 stored, 7 other sensors answer, 8 timeouts on the sensor bus, 9 frames skipped, 10 the second processor started again */
+  /** the last events, newest first: 0 none, 1 start, 2 command, 3 port closed, 4 bus asleep, 5 awake, 6 stored, 7 other sensors answer, 8 timeouts on the sensor bus, 9 frames skipped, 10 the second processor did not answer, and was started again */
   event_codes: Float64Array;
-  /** of these: type of the command; 1 if storing failed; number of timeouts or frames in a second */
+  /** of these: type of the command; 1 if storing failed; 1 if the second processor does not start; number of timeouts or frames in a second */
   event_details: Float64Array;
   /** registers; all 0 if they could not be recorded */
   r0: number;
