@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """What the firmware reports about presses that are hard, extreme, or none at all.
 
-    stiff.py --build build/host -o build/report [--limit N] [--check]
+    stiff.py --build build/host -o build/report [--limit N] [--check] [--picture host_tools/report/fit/stability.png]
 
 Each case draws presses, turns them into frames of absolute readings and runs them through the firmware's own chain: tare and gate (condition), fit
 (fit_gaussian, with the build's number of iterations), flags (contact). Only what the scan adds to a frame is restated here: the mark of a reading beyond
@@ -9,10 +9,10 @@ the sensor's range, and saturation to int32.
 
 A warning is UNCERTAIN, MODEL, FLAT, AT_BOUND, LOW_SIGNAL, FORCE_LOWER_BOUND, no contact or no fit. The firmware has the true settings: gains are exact where
 the case does not spread them. Bad means more than 1 mm from the truth, and any location where there is none to find; of two contacts the truth is the
-centroid of force. --check: exit status 1 if a result is not finite, or if more than 1.3 % of a case are bad and carry no warning (6 % where a prior is wrong).
+centroid of force. stability.png has the error of other kernels beside that of this chain, along one quantity at a time: in presses of sigma 6 mm, or as
+its axis says. --check: exit status 1 if a result is not finite, or if more than 1.3 % of a case are bad and carry no warning (6 % where a prior is wrong).
 """
 
-import argparse
 import pathlib
 import sys
 from types import SimpleNamespace
@@ -22,12 +22,13 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "report/measure", "python")]
 import presses  # noqa: E402
-from errors import BAD_mm, quantile
+from errors import BAD_mm, BUILT_ITERATIONS, USUAL_ITERATIONS, VALID, quantile
 from errors import WARNINGS as FIT_WARNINGS
 from fingertip.files import run_tool  # noqa: E402
 from fingertip.line import Flag  # noqa: E402
 from measure import Measure, round_half_away, stream_of  # noqa: E402
-from reporting import write_json  # noqa: E402
+from presentation import BLUE, GOAL, INK, ORANGE, plt, save, tidy  # noqa: E402
+from reporting import option_parser, output_folder, write_json  # noqa: E402
 
 SEED = 20221015
 ATMOSPHERE_Pa, NOISE_Pa = 101325.0, 5.0
@@ -249,17 +250,17 @@ def frames_of(measure, pressure_Pa, made):
     return frames
 
 
-def row_of(measure, layout, name, limit):
+def row_of(measure, layout, name, case, limit, others=lambda *_: {}):
+    """others(made, settings, frames): more of its figures."""
     random = measure.random(SEED, stream_of(name), np.arange(limit))  # a case of its own draws what it draws among the others
-    made = CASES[name](layout, random)
+    made = case(layout, random)
     settings = measure.settings(
         limit, gain_sd=made.gain_sd, prior_sigma_mm=made.prior_sigma_mm, prior_width_mm=0.5 if made.prior_sigma_mm else 0.0
     )
     quiet = Presses(pressure_Pa=np.zeros((measure.constants["zero_tare_frames"], len(layout.x_mm))))
     before = frames_of(measure, quiet.pressure_Pa, quiet)[:, 0].copy()
-    _, fits, results = (
-        found[:, 0] for found in measure.chain(layout.array, settings, frames_of(measure, made.pressure_Pa, made), before=before)
-    )
+    frames = frames_of(measure, made.pressure_Pa, made)
+    _, fits, results = (found[:, 0] for found in measure.chain(layout.array, settings, frames, before=before))
     flags = results["flags"]
     fitted = flags & np.uint32(Flag.FIT_VALID) != 0
     error_mm = np.full(limit, np.inf)
@@ -277,21 +278,99 @@ def row_of(measure, layout, name, limit):
         **{flag.lower(): float((flags & np.uint32(Flag[flag]) != 0).mean()) for flag in FLAGS},
         "bad_unflagged": float((bad & ~warned).mean()),
         "good_flagged": float((fitted & ~bad & warned).mean()),
+        "warned": float(warned.mean()),
+        **others(made, settings, frames[:, 0]),
     }
+
+
+def layout_of(measure, places=slice(None)):
+    x_mm, y_mm, pitch_mm = measure.layout()
+    at = x_mm[places], y_mm[places]
+    return SimpleNamespace(measure=measure, x_mm=at[0], y_mm=at[1], pitch_mm=pitch_mm, array=measure.array(*at, pitch_mm))
 
 
 def measure_cases(measure, limit):
     """stiff.json"""
-    x_mm, y_mm, pitch_mm = measure.layout()
-    plain = SimpleNamespace(measure=measure, x_mm=x_mm, y_mm=y_mm, pitch_mm=pitch_mm, array=measure.array())
-    twice = (np.repeat(x_mm[:7], 2), np.repeat(y_mm[:7], 2), pitch_mm)
-    pairs = SimpleNamespace(measure=measure, x_mm=twice[0], y_mm=twice[1], pitch_mm=pitch_mm, array=measure.array(*twice))
-    cases = [row_of(measure, pairs if name in IN_PAIRS else plain, name, limit) for name in CASES]
+    plain, pairs = layout_of(measure), layout_of(measure, np.repeat(np.arange(7), 2))
+    cases = [row_of(measure, pairs if name in IN_PAIRS else plain, name, case, limit) for name, case in CASES.items()]
     return {
         "seed": SEED,
         "bad_unflagged_worst": max([0.0, *(row["bad_unflagged"] for row in cases if row["case"] not in WRONG_PRIOR)]),
         "cases": cases,
     }
+
+
+def pressed(force_N, sigma_mm=6.0):
+    return inside((sigma_mm, sigma_mm), (1e6 * force_N / (2 * np.pi * sigma_mm**2),) * 2)
+
+
+# Of stability.png. Axis: (whether it is logarithmic, values, the case of each).
+SWEEPS = {
+    "force, N": (True, (0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 20), pressed),
+    "force, N, beyond the sensors' range": (True, (20, 30, 50, 100, 200, 400, 1000, 4000), pressed),
+    "width of the contact (sigma), mm": (True, (0.5, 1, 1.5, 2, 3, 5, 10, 20, 40, 80), lambda mm: inside((mm, mm))),
+    "gains apart, +- %, not calibrated": (False, (0, 2, 5, 10, 15, 20, 30, 40), lambda percent: gain_spread(percent / 100)),
+    "past the outer sensors, mm": (False, (-9, -6, -3, 0, 2, 4, 6, 9, 12), lambda mm: outside(False, (mm, mm))),
+    "sensors missing": (False, (0, 1, 2, 4, 6, 8, 10, 11, 12, 13), lambda missing: dead(presses.SENSORS - missing, False)),
+}
+# name, line and, where it is not the firmware's, iterations
+KERNELS = {
+    "fit": ("firmware, fixed point", "o-", BLUE, None),
+    "general": ("firmware, float32", "s:", "#0e9aa7", None),
+    "naive_double": ("Gauss-Newton, double", "x-", ORANGE, USUAL_ITERATIONS),
+    "lm_double": ("Levenberg-Marquardt, double", "+--", "#6f3d94", 50),
+}
+
+
+def measure_sweeps(measure, limit):
+    layout, compared = layout_of(measure), presses.Compared(measure)
+
+    def others(made, settings, frames):
+        readings = (frames["pressure_Pa_q10"][:, : presses.SENSORS] - int(1024 * ATMOSPHERE_Pa)).astype(np.int32)
+        usable, noise_Pa = frames["valid"] & ~frames["saturated"], np.full(limit, float(made.noise_Pa))
+        settings["noise_Pa_q10"], settings["iterations"], errors = frames["noise_Pa_q10"], BUILT_ITERATIONS, {}
+        for kernel, (*_, iterations) in KERNELS.items():
+            if iterations is None:
+                fits, _ = measure.timed_fit(layout.array, settings, readings, usable, kernel=kernel)
+            else:
+                fits, _ = compared.compare(kernel, iterations, noise_Pa, readings, usable)
+            error_mm = np.hypot(fits["x_mm"].astype(float) - made.x_mm, fits["y_mm"].astype(float) - made.y_mm)
+            errors[f"{kernel}_p95_mm"] = quantile(np.sort(np.nan_to_num(error_mm[fits["flags"] & VALID != 0], nan=np.inf)), 0.95)
+        return errors
+
+    rows = ((axis, at, case(at)) for axis, (_, values, case) in SWEEPS.items() for at in values)
+    return [{"axis": axis, "at": at} | row_of(measure, layout, axis, case, limit, others) for axis, at, case in rows]
+
+
+def draw(rows, path):
+    figure, places = plt.subplots(4, 3, figsize=(13, 11), layout="constrained", height_ratios=(3, 2, 3, 2))
+    for number, (axis, (is_log, values, _)) in enumerate(SWEEPS.items()):
+        of = [row for row in rows if row["axis"] == axis]
+        above, below = places[2 * (number // 3) : 2 * (number // 3) + 2, number % 3]
+        for kernel, (name, style, colour, _) in KERNELS.items():
+            off_mm = [row[f"{kernel}_p95_mm"] or np.nan for row in of]
+            above.plot(values, np.clip(off_mm, 1e-3, 100), style, color=colour, ms=5, lw=1.3, label=name)
+        above.set(yscale="log", ylim=(1e-3, 130))
+        for key, name, colour in (("warned", "a warning, or no fit", GOAL), ("bad_unflagged", "off by 1 mm, no warning", INK)):
+            below.plot(values, [100 * row[key] for row in of], "o-", color=colour, ms=4, lw=1.3, label=name)
+        below.set_ylim(-4, 104)
+        for axes, title, label in ((above, axis, "p95 off the truth, mm"), (below, "", "% of the presses")):
+            axes.set_xscale("log" if is_log else "linear")
+            tidy(axes, title, label)
+            if number == 0:
+                axes.legend(fontsize=8)
+    figure.suptitle(
+        "Where the fit ends: simulated Gaussian contacts, what is beyond 100 mm is drawn there", x=0.01, ha="left", size=12, weight="bold"
+    )
+    save(figure, path)
+
+
+def write(measure, limit, out):
+    """stiff.json and stability.png."""
+    found = measure_cases(measure, limit) | {"sweeps": measure_sweeps(measure, max(200, limit // 20))}
+    write_json(out / "stiff.json", found)
+    draw(found["sweeps"], out / "stability.png")
+    return found
 
 
 def failures(found):
@@ -304,16 +383,12 @@ def failures(found):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
-    parser.add_argument("-o", "--output", required=True, metavar="DIR", help="where stiff.json goes")
+    parser = option_parser(__doc__)
     parser.add_argument("--limit", type=int, default=8000, help="presses of each case (default: %(default)s)")
-    parser.add_argument("--check", action="store_true", help="exit status 1 if a case fails")
     options = parser.parse_args(argv)
-    found = measure_cases(Measure(options.build), options.limit)
-    out = pathlib.Path(options.output)
-    out.mkdir(parents=True, exist_ok=True)
-    write_json(out / "stiff.json", found)
+    found = write(Measure(options.build), options.limit, output_folder(options))
+    if options.picture:
+        draw(found["sweeps"], options.picture)
     for row in found["cases"]:
         print(f"{row['case']:38s} p50 {row['p50_mm'] or 0:8.4f} mm  bad without a warning {100 * row['bad_unflagged']:7.3f} %")
     failed = list(failures(found))

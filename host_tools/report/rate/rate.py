@@ -6,6 +6,7 @@
     rate.json    the figures by which the rate is judged, with their goals; all tables of rate.md
     rate.md      the same to read
     rate.png     the same to look at
+    scenes.png   what each scene computes, leaves out, and takes
 
 text.md.in describes what is measured.
 """
@@ -164,7 +165,8 @@ def main(argv):
         of_grasp = grasp_rate.figures(grasp)
     found = judge(figures(runs, resting, rows) | of_grasp, GOALS)
     found |= {"by_osr": by_osr(runs), "by_sensors": by_sensors(tools, runs), "scenes": rows}
-    return publish(found, options, "rate", {"rate.png": lambda path: rate_report.draw(path, found, runs[PARALLEL, 256])})
+    pictures = {"rate.png": lambda path: rate_report.draw(path, found, runs[PARALLEL, 256])}
+    return publish(found, options, "rate", pictures | {"scenes.png": lambda path: rate_report.draw_scenes(path, rows)})
 
 
 if __name__ == "__main__":

@@ -25,17 +25,6 @@ from boards import PARALLEL  # noqa: E402
 
 README = ROOT / "host_tools/README.md"
 BEGIN, END = "<!-- scenes: python3 host_tools/report/rate/scene_table.py --build build/host -->", "<!-- /scenes -->"
-WORDS = {
-    "FIT": "location, force",
-    "FULL_GRID": "widths, elongated contacts",
-    "OUTLIERS": "search for a broken sensor",
-    "TANGENTIAL_DOUBT": "warning of a tangential force that is not estimated, learning of gains",
-    "SLIP": "slip",
-    "TANGENTIAL": "tangential force, velocity",
-    "SHAPES": "contact shapes",
-    "RAW_STREAM": "raw packets",
-    "SYNC": "sync pin",
-}
 SECONDS, OSR, TOLERANCE = 0.5, 256, 0.02
 HEADINGS = (
     "scene",
@@ -48,15 +37,6 @@ HEADINGS = (
     "latency, median, us",
     "latency, p99, us",
 )
-
-
-def capabilities():
-    """{scene: its capabilities}, as cmake/options.cmake has them."""
-    text = (ROOT / "cmake/options.cmake").read_text(encoding="utf-8")
-    found = {}
-    for scene, names in re.findall(r"^set\(capabilities_of_(\w+) (.*)\)$", text, re.M):
-        found[scene] = sum((found[name[18:-1]] if name.startswith("${") else [name] for name in names.split()), [])
-    return found
 
 
 class OneScene(Tools):
@@ -126,11 +106,11 @@ def main(argv):
     parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
     parser.add_argument("--check", action="store_true", help="compare words and sizes with the table instead of writing it")
     options = parser.parse_args(argv)
-    text, on, rows = README.read_text(encoding="utf-8"), capabilities(), []
+    text, on, rows = README.read_text(encoding="utf-8"), scenes.capabilities(), []
     with tempfile.TemporaryDirectory() as folder:
         for scene in scenes.SCENES:
             tools = OneScene(options.build, scene)
-            words = [", ".join(word for name, word in WORDS.items() if (name in on[scene]) is there) for there in (True, False)]
+            words = [", ".join(word for name, word in scenes.WORDS.items() if (name in on[scene]) is there) for there in (True, False)]
             figures = [] if options.check else times(tools, folder, on[scene])
             rows.append([f"`{scene}`", words[0] or "pressures", words[1], *sizes(tools), *figures])
     if not options.check:

@@ -2,6 +2,7 @@
 
 import json
 import pathlib
+import re
 import sys
 import tempfile
 
@@ -12,12 +13,32 @@ from emulated import CLOCK_Hz, CONVERSION_us, Tools, scenario  # noqa: E402
 from reporting import run  # noqa: E402
 
 SCENES = ("raw", "press", "slip", "grasp", "shapes", "paper")
+WORDS = {
+    "FIT": "location, force",
+    "FULL_GRID": "widths, elongated contacts",
+    "OUTLIERS": "search for a broken sensor",
+    "TANGENTIAL_DOUBT": "warning of a tangential force that is not estimated, learning of gains",
+    "SLIP": "slip",
+    "TANGENTIAL": "tangential force, velocity",
+    "SHAPES": "contact shapes",
+    "RAW_STREAM": "raw packets",
+    "SYNC": "sync pin",
+}
 STREAM = dict.fromkeys(SCENES, "contact") | {"raw": "raw"}
 # The contact of the scenario "wander" stands from 0.65 s on; windows of whole temperature intervals.
 REST_s = (0.5, 0.58)
 CONTACT_FROM_s, WINDOW_s, SETTLE_s = 1.0, 1.0, 0.1
 # The watchdog and the record of a crash (boards/rp2040/crash.h): what runs all the time, and what they are compiled from.
 GUARD_FUNCTIONS, GUARD_OBJECTS = ("port_alive", "port_at", "port_event", "port_watchdog_feed", "stuck_parts"), ("crash.c", "fault.S")
+
+
+def capabilities():
+    """{scene: its capabilities}, as cmake/options.cmake has them."""
+    text = (ROOT / "cmake/options.cmake").read_text(encoding="utf-8")
+    found = {}
+    for scene, names in re.findall(r"^set\(capabilities_of_(\w+) (.*)\)$", text, re.M):
+        found[scene] = sum((found[name[18:-1]] if name.startswith("${") else [name] for name in names.split()), [])
+    return found
 
 
 def build(scene, board, folder):

@@ -4,6 +4,8 @@ A goal is (name, sign, limit): sign ">=" or "<="; limit a number or the name of 
 measured is None.
 """
 
+import itertools
+
 import matplotlib
 import numpy as np
 
@@ -120,7 +122,7 @@ def tidy(axes, title, label="", grid="y"):
 def draw_panels(found, path, title, shape, size, panels):
     """A picture of rows and columns of panels (figure, draw(axes)), each where the figure was measured."""
     figure, places = plt.subplots(*shape, figsize=size, layout="constrained")
-    for axes, (name, panel) in zip(places.flat, panels):
+    for axes, (name, panel) in itertools.zip_longest(places.flat, panels, fillvalue=(None, None)):
         if name in found:
             panel(axes)
         else:

@@ -63,13 +63,12 @@ def draw_objects(axes, rows):
     axes.plot(places, [row["vector_error_p95"] for row in rows], "_", color=INK, ms=8, label="95 %")
     for x, row in enumerate(rows):
         if row["valid_percent"] < 99:
-            axes.annotate(
-                f"{row['valid_percent']:.0f} %", (x, row["vector_error_p95"] or 0), ha="center", va="bottom", size=7, color=ORANGE
-            )
+            at = x, row["vector_error_p95"] or 0
+            axes.annotate(f"{row['valid_percent']:.0f}", at, ha="center", va="bottom", size=7, color=ORANGE)
     axes.set_xticks(places, [row["object"] for row in rows], rotation=60, ha="right")
     axes.axhline(0.05, color=GOAL, lw=1, ls="--")
     axes.legend(fontsize=8, loc="upper left")
-    tidy(axes, "Error of Q/F by object (orange: share that is valid)", "error at Q/F = 0.3")
+    tidy(axes, "Error of Q/F by object (orange: % that is valid)", "error at Q/F = 0.3")
 
 
 def draw_overhang(axes, rows):

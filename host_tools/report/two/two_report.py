@@ -13,7 +13,7 @@ def draw_pairs(axes, rows):
         axes.plot(DISTANCES_mm, [row["two_and_right"] for row in line], "o-", color=colour, label=f"{ratio}, two and right")
     axes.set_ylim(0, 105)
     axes.set_xlabel("distance of the two, mm", size=9)
-    axes.legend(fontsize=8)
+    axes.legend(fontsize=8, loc="lower right")
     tidy(axes, "Pairs that are found", "% of touches")
 
 

@@ -17,8 +17,9 @@ std::string only_port() {
   for (const GripperPort &port : ports) {
     names += " " + port.path;
   }
-  throw WrongUsage(ports.empty() ? "no serial port on USB is here; name the gripper's with --port"
-                                 : "choose one with --port:" + names);
+  throw WrongUsage(ports.empty()
+                       ? "no serial port on USB is here; name the gripper's with --port (of grasp, --gripper-port)"
+                       : "choose one with --port (of grasp, --gripper-port):" + names);
 }
 
 } // namespace

@@ -4,6 +4,7 @@ usage: test_fit_report.py --build BUILD --boards BOARDS
 """
 
 import csv
+import json
 import pathlib
 import sys
 
@@ -13,8 +14,8 @@ import report_case  # noqa: E402
 FIGURES = """observable_presses p99_9_um shipped_p99_9_um shipped_above_100um above_100um masked_p99_9_um masked_p99_um_d masked_peak_p99_um
     masked_peak_above_100um_d bad_unflagged_percent_worst good_flagged_percent_c good_flagged_percent_d cold_cycles masked_cycles
     speed_vs_ceres speed_vs_tinysolver speed_vs_cminpack""".split()
-# Worst over the presses measured here; the goals are in fit.py.
-COLD_CYCLES_MAX = 31000
+# Worst over the presses measured here, with a past; the goals are in fit.py.
+COLD_CYCLES_MAX = 31500
 MASKED_CYCLES_MAX = 62000
 FEW = "--limit 600 --budget 0.25 --passes 1".split()
 
@@ -30,8 +31,7 @@ class Report(report_case.ReportCase):
 
     def test_every_figure_is_there(self):
         for name in FIGURES:
-            self.assertIn(name, self.found)
-            self.assertIsNotNone(self.found[name], name)
+            self.assertIsNotNone(self.found.get(name), name)
 
     def test_figures_make_sense(self):
         found = self.found
@@ -59,11 +59,21 @@ class Report(report_case.ReportCase):
             self.assertLess(float(self.cycles[kernel, "iterations=10"]["p50_um"]), 0.1, kernel)
 
     def test_table_and_plot(self):
-        self.assertEqual((self.folder / "fit_report.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        for name in ("fit_report.png", "stability.png"):
+            self.assertEqual((self.folder / name).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         lines = (self.folder / "fit_table.md").read_text().split("\n")
         for kernel in ("fit", "general", "lm_double", "ceres_reused", "cminpack"):
             columns = {line.count("|") for line in lines if line.startswith(f"| {kernel} |")}
             self.assertEqual(columns, {15}, kernel)
+
+    def test_where_the_fit_ends(self):
+        rows = json.loads((self.folder / "stiff.json").read_text())["sweeps"]
+        self.assertEqual(len({row["axis"] for row in rows}), 6)
+        for row in rows:
+            if not row["axis"].startswith("gains") or row["at"] <= 10:
+                self.assertLessEqual(row["bad_unflagged"], 0.013, row)
+            if row["warned"] < 0.1:
+                self.assertLess(row["fit_p95_mm"], 1.02 * row["lm_double_p95_mm"], row)
 
     def test_a_missing_image_is_one_line(self):
         self.assert_refused("fit_cycles.bin is not there; build it", *FEW, boards=self.folder)

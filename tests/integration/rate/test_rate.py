@@ -92,7 +92,8 @@ class Rate(report_case.ReportCase):
         self.assertEqual(row["delivery_us"], emulated.distribution(again.delivered_us))
 
     def test_text_and_picture(self):
-        self.assertEqual((self.folder / "rate.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        for name in ("rate.png", "scenes.png"):
+            self.assertEqual((self.folder / name).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         text = (self.folder / "rate.md").read_text()
         for name, *_ in rate.GOALS:
             self.assertRegex(text, rf"\| {name} \| [0-9.]+ \| [<>]= [0-9]+ \| (met|MISSED) \|")
