@@ -21,7 +21,10 @@ KINDS = (
     ("holds several", "several"),
     ("no fingertip", "no such"),
     ("format .* is unknown", "other format"),
-    (r":1: no recording|no recording of a fingertip|no MCAP file|packed by|spreadsheet", "no recording"),
+    (
+        r":1: no recording|no recording of a fingertip|no MCAP file|packed as|UTF-16|spreadsheet|mcap (?:compress|filter|recover)",
+        "no recording",
+    ),
     (r":\d+: |damaged|torn|no header line|missing", "damaged"),
 )
 

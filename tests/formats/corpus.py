@@ -1,11 +1,15 @@
 """The inputs of the test: recordings, CSV and MCAP, of one fingertip and of two; bytes of lines; settings as people type them. Good ones, the
 same damaged in ways that have a name, and by chance. All follow from here, from tests/vectors/wire and from tests/fuzz/corpus.
 
-A job is {"name", "kind": "recording" | "stream" | "setting", "input": path or text, "salvage", "device"}.
+A job is {"name", "kind": "recording" | "stream" | "setting", "input": path or text, "salvage", "device"}, and of some recordings "rows_of", "is_whole".
 """
 
+import bz2
+import gzip
+import lzma
 import pathlib
 import random
+import re
 import struct
 import sys
 import zlib
@@ -15,7 +19,9 @@ sys.path[:0] = [str(ROOT / folder) for folder in ("tests/support", "tests/fuzz",
 
 import bags  # noqa: E402
 import fuzz  # noqa: E402
+import lz4.frame  # noqa: E402
 import mcap.writer  # noqa: E402
+import zstandard  # noqa: E402
 from fingertip import RecordingWriter, wire  # noqa: E402
 from fingertip.line import LATER_COLUMNS, SHAPE_COLUMNS, Flag  # noqa: E402
 from fingertip.mcap_recording import CONTACT_TYPE, LINE_TYPE  # noqa: E402
@@ -24,6 +30,7 @@ from mcap.reader import make_reader  # noqa: E402
 
 CHANCES = 120  # for each seed that chance damages
 FRAMES = 8
+FAR_lines = 70_000  # more than a reader lets wait for one before them
 VERSION_AT, TYPE_AT = 0, 1  # of a packet
 
 
@@ -32,13 +39,16 @@ class Corpus:
         self.folder = pathlib.Path(folder)
         self.jobs = []
 
-    def recording(self, name, content, end="csv", devices=("",)):
+    def recording(self, name, content, end="csv", devices=("",), rows_of="", is_whole=True):
+        """rows_of: the name of a recording with the same rows; all of them if it is_whole."""
         path = self.folder / f"{name}.{end}"
         path.write_bytes(content)
         for device in devices:
             for salvage in (False, True):
                 words = [name, end, *filter(None, [device]), *["salvage"] * salvage]
-                self.jobs.append({"name": " ".join(words), "kind": "recording", "input": str(path), "salvage": salvage, "device": device})
+                job = {"name": " ".join(words), "kind": "recording", "input": str(path), "salvage": salvage, "device": device}
+                same = {"rows_of": " ".join([rows_of, *words[1:]]), "is_whole": is_whole} if rows_of else {}
+                self.jobs.append(job | same)
         return path
 
     def stream(self, name, content):
@@ -299,6 +309,61 @@ def bag_of(
                 writer.add_message(channels[each], number, data if isinstance(data, bytes) else encode(each, data), number)
         writer.finish()
     return path.read_bytes()
+
+
+def rewritten(corpus, bag, order=list, only="", pack=bytes, **options):
+    """A bag as PyPI's mcap writes it: the messages of these topics in this order, in chunks of a few frames."""
+    with open(bag, "rb") as file:
+        found = order([each for each in make_reader(file).iter_messages() if re.search(only, each[1].topic)])
+    path = corpus.folder / "scratch.mcap"
+    with open(path, "wb") as file:
+        writer = mcap.writer.Writer(file, **{"chunk_size": 3_000, **options})
+        writer.start("ros2", "other")
+        channels = {}
+        for schema, channel, message in found:
+            if channel.topic not in channels:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, "cdr", number)
+            writer.add_message(channels[channel.topic], message.log_time, pack(message.data), message.publish_time)
+        writer.finish()
+    return path.read_bytes()
+
+
+def cases_by_others(corpus, name, bag, devices):
+    """A recording that went through tools of others."""
+    prng = random.Random(name)
+
+    def in_blocks(found, of=15):
+        blocks = [found[at : at + of] for at in range(0, len(found), of)]
+        prng.shuffle(blocks)
+        return sum(blocks, [])
+
+    corpus.recording(f"{name}_whole", bag.read_bytes(), "mcap", devices)
+    unindexed = {"index_types": mcap.writer.IndexType.NONE, "use_statistics": False, "use_summary_offsets": False}
+    for what, how in {
+        "by_time": {},
+        "by_topic": {"order": lambda found: sorted(found, key=lambda each: each[1].topic)},
+        "chunks_shuffled": {"order": in_blocks},
+        "chunks_backwards": {"order": lambda found: found[::-1]},
+        "chunks_shuffled_unindexed": {"order": in_blocks, **unindexed},
+        "shuffled": {"order": lambda found: prng.sample(found, len(found))},
+        "one_chunk": {"chunk_size": 10**9},
+        "no_chunks_by_time": {"use_chunking": False},
+        "messages_packed": {"pack": zstandard.compress},
+        "topics_only": {"only": "/(contact|wrench|place|pressures)$|diagnostics"},
+        "topics_only_no_chunks": {"only": "/(contact|wrench|place|pressures)$", "use_chunking": False},
+        "topics_packed": {"only": "contact|pressures", "pack": zstandard.compress},
+        "contacts_alone": {"only": "contact"},
+        "channels_late": {"order": lambda found: sorted(found, key=lambda each: "lines" in each[1].topic), "chunk_size": 1000},
+        "others_alone": {"only": "wrench|place|diagnostics"},
+        "lines_alone": {"only": "lines"},
+    }.items():
+        data = rewritten(corpus, bag, **how)
+        is_whole = "alone" not in what and (name == "one_bag" or "topics" not in what)
+        corpus.recording(f"{name}_{what}", data, "mcap", devices, f"{name}_whole", is_whole)
+        corpus.recording(f"{name}_{what}_cut", data[: len(data) * 2 // 3], "mcap", devices, f"{name}_whole", False)
+    for pack in (zstandard.compress, gzip.compress, lz4.frame.compress, bz2.compress, lzma.compress):
+        corpus.recording(f"{name}_packed_as_a_whole_by_{pack.__module__.split('.')[0]}", pack(bag.read_bytes()), "mcap", devices)
 
 
 def messages_of(path):
@@ -583,7 +648,21 @@ def make(folder, convert):
         bag_cases(corpus, f"{name}_of_package", by_package.read_bytes(), devices, 2 * CHANCES)
         message_cases(corpus, f"{name}_bag", by_tool, devices)
         if name == "one":
+            cases_by_others(corpus, "one_bag", by_tool, devices)
+            by_lz4 = rewritten(corpus, by_tool, compression=mcap.writer.CompressionType.LZ4)
+            bag_cases(corpus, "one_packed_by_lz4", by_lz4, devices, CHANCES)
+        if name == "one":
             inner_cases(corpus, messages_of(by_tool), devices)
+    lines, bag = lines_of(two), corpus.folder / "start_many.mcap"
+    rows = [line.replace("000.5", f"{time:03}.5", 1) for time in (*range(40), *range(30, 70)) for line in lines if line[0].isdigit()]
+    start.write_bytes(text_of([*lines[: header_at(lines) + 1], *rows, lines[-1]]))
+    convert(start, bag)
+    cases_by_others(corpus, "many_bag", bag, ("BBBB",))
+    notes = len(rows) * ["# note"] * (FAR_lines // len(rows) // len(rows))
+    start.write_bytes(text_of([*lines[: header_at(lines) + 1], *(line for row in rows for line in (row, *notes)), lines[-1]]))
+    convert(start, bag)
+    backwards = rewritten(corpus, bag, lambda found: found[::-1], chunk_size=100_000)
+    corpus.recording("many_bag_far_backwards", backwards, "mcap", ("BBBB",), "many_bag_whole")
     for path in sorted((ROOT / "tests/fuzz/corpus/mcap").iterdir()):
         corpus.recording(f"fuzz_{path.name}", fuzz_seed(path), "mcap", ("", "AAAA", "BBBB"))
     stream_cases(corpus)

@@ -123,7 +123,11 @@ struct fingertip_reader;
 struct fingertip_reader *fingertip_reader_new(const char *name, uint64_t size, int salvage);
 void fingertip_reader_free(struct fingertip_reader *reader);
 
-/* The next bytes of the file, from its beginning on. They are copied. */
+/* Where in the file the bytes to be fed next are: at first its beginning, then behind those that were fed, but for MCAP
+ * files, whose index at the end is read first, and whose chunks may be in another order than that of time. */
+uint64_t fingertip_reader_wants(const struct fingertip_reader *reader);
+
+/* The bytes of the file from fingertip_reader_wants on. They are copied. */
 enum fingertip_status fingertip_reader_feed(struct fingertip_reader *reader, const uint8_t *bytes, size_t length);
 
 struct fingertip_item {

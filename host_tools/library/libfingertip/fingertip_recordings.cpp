@@ -29,35 +29,30 @@ public:
 
   void feed(const std::uint8_t *bytes, std::size_t length) {
     bytes_.erase(0, std::exchange(done_, 0));
-    if (skip_ > 0) { /* what lies before is not wanted */
-      const auto skipped = static_cast<std::size_t>(std::min<std::uint64_t>(skip_, length));
-      skip_ -= skipped;
-      begin_ += skipped;
-      bytes += skipped;
-      length -= skipped;
-    }
     bytes_.append(reinterpret_cast<const char *>(bytes), length);
   }
 
   std::string_view all() const { return std::string_view(bytes_).substr(done_); }
   std::uint64_t begin() const { return begin_; }
-  std::uint64_t size() const { return std::max(size_, begin_ + all().size()); }
-  bool is_whole() const { return begin_ + all().size() >= size_; }
+  std::uint64_t size() const { return std::max(size_, end()); }
+  std::uint64_t end() const { return begin_ + all().size(); }
+  bool is_whole() const { return end() >= size_; }
 
-  /* What comes before is not needed any more. */
+  /* What comes before is not needed now. */
   void go_to(std::uint64_t at) {
-    const std::uint64_t forward = at > begin_ ? at - begin_ : 0;
-    const auto here = static_cast<std::size_t>(std::min<std::uint64_t>(forward, all().size()));
-    done_ += here;
-    begin_ += here;
-    skip_ = forward - here;
+    if (at < begin_ || at > end()) {
+      bytes_.clear();
+      done_ = 0;
+    } else {
+      done_ += static_cast<std::size_t>(at - begin_);
+    }
+    begin_ = at;
   }
 
 private:
   std::string bytes_;
   std::size_t done_ = 0;    /* of these */
   std::uint64_t begin_ = 0; /* place of the first that is not done */
-  std::uint64_t skip_ = 0;  /* of those to come */
   std::uint64_t size_;
 };
 
@@ -67,7 +62,8 @@ public:
 
   std::size_t read(std::uint64_t at, char *to, std::size_t length) override {
     /* A reader goes back by the head of a record at most. */
-    window_.go_to(at - std::min<std::uint64_t>(at, mcap::RECORD_HEAD_BYTES));
+    const bool is_there = at >= window_.begin() && at <= window_.end();
+    window_.go_to(is_there ? std::max(window_.begin(), at - std::min<std::uint64_t>(at, mcap::RECORD_HEAD_BYTES)) : at);
     const std::uint64_t before = at - window_.begin();
     const std::string_view bytes = window_.all();
     if (bytes.size() < before + length && !window_.is_whole()) {
@@ -161,6 +157,8 @@ enum fingertip_status fingertip_reader_feed(struct fingertip_reader *reader, con
     return FINGERTIP_OK;
   });
 }
+
+uint64_t fingertip_reader_wants(const struct fingertip_reader *reader) { return reader->window.end(); }
 
 enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, struct fingertip_item *item,
                                             double *values, size_t size, size_t *count) {

@@ -1,6 +1,7 @@
 /* The lines of a recording, whatever file they are in: CSV, or MCAP (mcap_recording.hpp). */
 #pragma once
 
+#include <any>
 #include <cstddef>
 #include <cstdint>
 #include <ios>
@@ -32,6 +33,7 @@ public:
     std::streamoff offset = 0;
     std::size_t message = 0; /* of a chunk that begins there */
     std::uint64_t number = 0;
+    std::any waiting = {}; /* the source's own */
   };
 
   virtual ~LineSource() = default;

@@ -2,6 +2,7 @@
 
 #include "libfingertip/error.hpp"
 #include "libfingertip/little_endian.hpp"
+#include "libfingertip/text.hpp"
 
 #include <algorithm>
 
@@ -84,8 +85,6 @@ public:
     return take(length);
   }
   std::string_view rest() const { return bytes_; }
-
-private:
   std::string_view take(std::uint64_t length) {
     if (length > bytes_.size()) {
       throw Damage("a record ends within a field");
@@ -94,22 +93,72 @@ private:
     bytes_.remove_prefix(length);
     return taken;
   }
+
+private:
   std::string_view bytes_;
 };
+
+/* One more block of an LZ4 frame, to at most this size (lz4_Block_format.md of github.com/lz4/lz4). Throws Damage. */
+void unpack_lz4_block(std::string_view block, std::string &bytes, std::uint64_t size) {
+  constexpr std::size_t LONG = 15, MATCH_LEAST = 4;
+  Fields fields(block);
+  const auto length = [&](std::size_t begin) {
+    for (std::uint8_t more = begin == LONG ? 255 : 0; more == 255; begin += more) {
+      more = fields.get<std::uint8_t>();
+    }
+    return begin;
+  };
+  while (!fields.rest().empty()) {
+    const auto token = fields.get<std::uint8_t>();
+    bytes += fields.take(length(token >> 4));
+    if (fields.rest().empty()) {
+      return; /* the last sequence has no match */
+    }
+    const std::size_t back = fields.get<std::uint16_t>(), count = length(token & LONG) + MATCH_LEAST;
+    if (back == 0 || back > bytes.size() || count > size - std::min<std::uint64_t>(size, bytes.size())) {
+      throw Damage("a chunk cannot be unpacked");
+    }
+    for (std::size_t i = 0; i < count; i++) { /* may overlap */
+      bytes += bytes[bytes.size() - back];
+    }
+  }
+}
+
+/* The content of an LZ4 frame (lz4_Frame_format.md), whose own checksums are left to the chunk's. Throws Damage. */
+std::string unpacked_lz4(std::string_view frame, std::uint64_t size) {
+  constexpr std::uint32_t BEGIN = 0x184D2204, IS_PLAIN = 1u << 31;
+  enum : std::uint8_t { HAS_DICTIONARY = 1, HAS_SIZE = 8, HAS_BLOCK_CHECKSUMS = 16 };
+  Fields fields(frame);
+  if (fields.get<std::uint32_t>() != BEGIN) {
+    throw Damage("a chunk cannot be unpacked");
+  }
+  const auto flags = fields.get<std::uint8_t>();
+  fields.take(1u + (flags & HAS_SIZE ? 8u : 0u) + (flags & HAS_DICTIONARY ? 4u : 0u) + 1u);
+  std::string bytes;
+  while (const auto length = fields.get<std::uint32_t>()) {
+    const std::string_view block = fields.take(length & ~IS_PLAIN);
+    if (length & IS_PLAIN) {
+      bytes += block;
+    } else {
+      unpack_lz4_block(block, bytes, size);
+    }
+    fields.take(flags & HAS_BLOCK_CHECKSUMS ? 4 : 0);
+  }
+  return bytes;
+}
 
 std::string unpacked(std::string_view compression, std::string_view packed, std::uint64_t size) {
   if (compression.empty()) {
     return std::string(packed);
   }
+  if (size > CHUNK_MOST_bytes) {
+    throw Damage("a chunk of " + std::to_string(size) + " bytes");
+  }
   if (compression == "lz4") {
-    throw Error(ErrorCode::unread_kind,
-                "chunks packed by lz4 are not read; pack them by zstd: mcap compress FILE -o OUT");
+    return unpacked_lz4(packed, size);
   }
   if (compression != "zstd") {
     throw Damage("compression \"" + std::string(compression.substr(0, 20)) + "\" is unknown");
-  }
-  if (size > CHUNK_MOST_bytes) {
-    throw Damage("a chunk of " + std::to_string(size) + " bytes");
   }
   std::string bytes(static_cast<std::size_t>(size), '\0');
   if (!unpack(packed, bytes)) {
@@ -314,7 +363,31 @@ void Writer::finish() {
   append(data_end + end + std::string(MAGIC, sizeof MAGIC));
 }
 
+std::optional<std::uint64_t> declared_size(std::string_view frame) {
+  constexpr std::string_view BEGIN = "\x28\xb5\x2f\xfd";
+  constexpr std::size_t DICTIONARY_bytes[] = {0, 1, 2, 4};
+  const auto byte = [&](std::size_t at) -> std::uint64_t {
+    return at < frame.size() ? static_cast<unsigned char>(frame[at]) : 0;
+  };
+  const std::uint64_t descriptor = byte(BEGIN.size()), width = descriptor >> 6;
+  const bool is_single = (descriptor >> 5 & 1) != 0;
+  if (frame.substr(0, BEGIN.size()) != BEGIN || (width == 0 && !is_single)) {
+    return std::nullopt;
+  }
+  const std::size_t begin = BEGIN.size() + 1 + !is_single + DICTIONARY_bytes[descriptor & 3];
+  std::uint64_t size = width == 1 ? 256 : 0;
+  for (std::size_t i = 0; i < std::size_t{1} << width; i++) {
+    size += byte(begin + i) << (8 * i);
+  }
+  return size;
+}
+
 bool Reader::next(Message &message) {
+  if (!has_index_) {
+    read_index();
+    has_index_ = true;
+    next_ = first_;
+  }
   while (at_message_ == messages_.size()) {
     if (!read_record()) {
       return false;
@@ -322,6 +395,82 @@ bool Reader::next(Message &message) {
   }
   message = messages_[at_message_++];
   return true;
+}
+
+const Reader::Message *Reader::with_last(const std::string &type) const {
+  return find_in(messages_, [&](const Message &each) { return each.type == type; });
+}
+
+bool Reader::knows(const std::string &type) const {
+  return std::any_of(channels_.begin(), channels_.end(), [&](const auto &each) { return each.second.type == type; });
+}
+
+/* A sound index at the end has all channels, and the order of chunks by time, if they are in another one. Changes
+ * nothing of what a second call needs where the source throws. */
+void Reader::read_index() {
+  constexpr std::size_t FOOTER_bytes = 20, END_bytes = RECORD_HEAD_BYTES + FOOTER_bytes + sizeof MAGIC;
+  constexpr std::uint64_t SUMMARY_MOST_bytes = 1 << 28;
+  const std::uint64_t size = bytes_->size();
+  if (size < sizeof MAGIC + END_bytes) {
+    return;
+  }
+  const std::uint64_t footer = size - END_bytes;
+  if (!summary_) {
+    char end[END_bytes];
+    const bool is_whole = bytes_->read(footer, end, sizeof end) == sizeof end && end[0] == FOOTER &&
+                          std::equal(std::begin(MAGIC), std::end(MAGIC), end + END_bytes - sizeof MAGIC);
+    summary_ = is_whole ? number_at<std::uint64_t>({end, sizeof end}, RECORD_HEAD_BYTES) : 0;
+  }
+  if (*summary_ < sizeof MAGIC || *summary_ >= footer || footer - *summary_ > SUMMARY_MOST_bytes) {
+    return;
+  }
+  std::string summary(footer - *summary_ + RECORD_HEAD_BYTES + FOOTER_bytes, '\0');
+  if (bytes_->read(*summary_, summary.data(), summary.size()) < summary.size()) {
+    return;
+  }
+  const std::string_view all = summary;
+  const auto crc = number_at<std::uint32_t>(all, all.size() - 4);
+  if (crc != 0 && crc != crc_of(all.substr(0, all.size() - 4))) {
+    return;
+  }
+  std::map<std::uint64_t, std::uint64_t> begins_ns; /* by their places in the file */
+  try {
+    for (Fields records(all); !records.rest().empty();) {
+      const auto opcode = records.get<std::uint8_t>();
+      const std::string_view content = records.text<std::uint64_t>();
+      Fields fields(content);
+      if (opcode == SCHEMA || opcode == CHANNEL) {
+        judge(opcode, content, 1);
+      } else if (opcode == CHUNK_INDEX) {
+        const auto begin_ns = fields.get<std::uint64_t>();
+        fields.get<std::uint64_t>(); /* the end */
+        begins_ns[std::min(fields.get<std::uint64_t>(), *summary_)] = begin_ns;
+      }
+    }
+  } catch (const Damage &) {
+    schemas_.clear();
+    channels_.clear();
+    return;
+  }
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> by_time;
+  for (const auto &[at, begin_ns] : begins_ns) {
+    by_time.emplace_back(begin_ns, at);
+  }
+  if (std::is_sorted(by_time.begin(), by_time.end())) {
+    return;
+  }
+  std::sort(by_time.begin(), by_time.end());
+  first_ = static_cast<std::streamoff>(by_time[0].second);
+  for (std::size_t i = 0; i < by_time.size(); i++) {
+    order_[static_cast<std::streamoff>(by_time[i].second)] =
+        static_cast<std::streamoff>(i + 1 < by_time.size() ? by_time[i + 1].second : *summary_);
+  }
+}
+
+/* Of the record that is read, which ends there: where to read on. */
+std::streamoff Reader::after(std::streamoff end) const {
+  const auto found = order_.find(record_);
+  return found == order_.end() ? end : found->second;
 }
 
 /* False at the end. Changes nothing where the source throws. */
@@ -346,8 +495,8 @@ bool Reader::read_record() {
     torn_ = ended_ = true;
     return false;
   }
-  const auto next = record_ + static_cast<std::streamoff>(sizeof head + length);
-  if (opcode == DATA_END) {
+  const auto next = after(record_ + static_cast<std::streamoff>(sizeof head + length));
+  if (opcode == DATA_END || (!order_.empty() && at >= *summary_)) {
     next_ = next;
     ended_ = true;
     return false;
@@ -428,7 +577,7 @@ void Reader::read_chunk(std::string_view content) {
 }
 
 void Reader::go_to(const Place &place) {
-  next_ = place.offset;
+  next_ = place.offset == sizeof MAGIC ? first_ : place.offset;
   ended_ = torn_ = false;
   messages_.clear();
   at_message_ = 0;

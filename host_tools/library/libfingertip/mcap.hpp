@@ -1,6 +1,7 @@
 /* MCAP files (mcap.dev/spec). The writer packs chunks by zstd, each with its index. It appends a chunk at once, so that
- * a killed one leaves every chunk except the one under way. The reader gives messages in the order in which they were
- * written, from the beginning and without the index, so that a file whose end is missing reads as far as it goes. */
+ * a killed one leaves every chunk except the one under way. The reader gives messages in the order in which they are
+ * in the file, so that one whose end is missing reads as far as it goes; chunks that are in another order than that of
+ * time it reads by the index. */
 #pragma once
 
 #include "libfingertip/line_source.hpp"
@@ -11,6 +12,7 @@
 #include <ios>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -27,6 +29,8 @@ extern const char *const COMPRESSION; /* of packed(), its name in the file */
 std::string packed(const std::string &bytes);
 /* By zstd; false unless exactly the bytes that `to` has room for come of it. */
 bool unpack(std::string_view packed, std::string &to);
+/* The content size that a zstd frame declares (RFC 8878, 3.1.1.1); nothing: it declares none, or is no such frame. */
+std::optional<std::uint64_t> declared_size(std::string_view frame);
 
 using Pairs = std::vector<std::pair<std::string, std::string>>;
 
@@ -95,6 +99,10 @@ public:
 
   /* False at the end. Throws Damage. */
   bool next(Message &message);
+  /* Of this type, among those that were read together with the last one; nullptr: none. */
+  const Message *with_last(const std::string &type) const;
+  /* Whether a channel has it. */
+  bool knows(const std::string &type) const;
   /* At the end: whether the file breaks off. */
   bool is_torn() const { return torn_; }
 
@@ -110,6 +118,8 @@ private:
   void judge(std::uint8_t opcode, std::string_view content, int depth);
   void read_chunk(std::string_view content);
   bool read_record();
+  void read_index();
+  std::streamoff after(std::streamoff end) const;
 
   std::unique_ptr<ByteSource> bytes_;
   std::streamoff record_ = sizeof MAGIC; /* the one whose messages wait */
@@ -118,7 +128,11 @@ private:
   std::size_t at_message_ = 0;
   bool torn_ = false;
   bool ended_ = false;
-  std::map<std::uint16_t, std::string> schemas_; /* their names */
+  bool has_index_ = false;                         /* it was read, if there is one */
+  std::optional<std::uint64_t> summary_;           /* where it begins, once that is known; 0: there is none */
+  std::map<std::streamoff, std::streamoff> order_; /* of chunks: the one after each by time; empty: as in the file */
+  std::streamoff first_ = sizeof MAGIC;            /* of them */
+  std::map<std::uint16_t, std::string> schemas_;   /* their names */
   std::map<std::uint16_t, Channel> channels_;
 };
 

@@ -6,6 +6,7 @@
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <ctime>
 
@@ -17,6 +18,9 @@ namespace {
 
 constexpr const char *CONTACT = "fingertip_msgs/Contact";
 constexpr const char *LINE = "fingertip_msgs/Line";
+constexpr const char *PRESSURES = "sensor_msgs/PointCloud2";
+constexpr std::size_t WAITING_MOST = 1 << 16; /* lines for one before them, before it counts as lost: 50 s, 50 MB */
+constexpr std::uint64_t MESSAGE_MOST_bytes = 1 << 20; /* packed by itself */
 
 /* The name in schemas: "fingertip_msgs/msg/Line". */
 std::string full_name(const std::string &name) {
@@ -107,6 +111,17 @@ bool is_text(const std::string &text) {
   std::replace_if(
       plain.begin(), plain.end(), [](char c) { return c == '\t' || c == '\r'; }, ' ');
   return printable(plain) == plain;
+}
+
+/* In "/fingertip/SERIAL/contact". */
+std::string serial_in(const std::string &topic) {
+  const auto words = split(topic, '/');
+  std::string name(words[words.size() >= 2 ? words.size() - 2 : 0]);
+  return name.substr(name.size() > 1 && name[0] == 's' && std::isdigit(static_cast<unsigned char>(name[1])) ? 1 : 0);
+}
+
+mcap::Reader::Message line_message(const ros::Line &line) {
+  return {"/fingertip/lines", full_name(LINE), ros::encode({0, ""}, line)};
 }
 
 std::string joint_cells(std::uint32_t device, double time_us) {
@@ -238,8 +253,8 @@ void McapLineSink::begin() {
     }
   }
   std::map<std::string, std::uint16_t> schemas;
-  for (const char *name : {CONTACT, LINE, "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped",
-                           "sensor_msgs/PointCloud2", "diagnostic_msgs/DiagnosticArray"}) {
+  for (const char *name : {CONTACT, LINE, "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped", PRESSURES,
+                           "diagnostic_msgs/DiagnosticArray"}) {
     schemas[name] = writer_.schema(full_name(name), "ros2msg", ros::schema_of(name));
   }
   auto channel = [&](const std::string &topic, const char *name) {
@@ -252,7 +267,7 @@ void McapLineSink::begin() {
     device.contact = channel(root + "contact", CONTACT);
     device.wrench = channel(root + "wrench", "geometry_msgs/WrenchStamped");
     device.place = channel(root + "place", "geometry_msgs/PointStamped");
-    device.pressures = channel(root + "pressures", "sensor_msgs/PointCloud2");
+    device.pressures = channel(root + "pressures", PRESSURES);
   }
   for (const auto &[text, torn] : head) {
     put_line(text, torn);
@@ -275,10 +290,14 @@ void McapLineSink::put_line(const std::string &text, bool torn) {
   if (!is_text(text)) {
     throw Error(path() + ": line " + std::to_string(number_) + " is no UTF-8 text, which an MCAP file cannot hold");
   }
-  writer_.message(lines_, clock_.now_ns(), ros::encode({clock_.now_ns(), ""}, ros::Line{number_, text, torn}));
+  add(lines_, ros::encode({clock_.now_ns(), ""}, ros::Line{number_, text, torn}));
 }
 
-void McapLineSink::diagnose(const std::string &message) { writer_.message(diagnostics_, clock_.now_ns(), message); }
+/* In order of time, so that no tool changes their order, although rows of several may step back in time. */
+void McapLineSink::add(std::uint16_t channel, const std::string &message) {
+  last_ns_ = std::max(last_ns_, clock_.now_ns());
+  writer_.message(channel, last_ns_, message);
+}
 
 void McapLineSink::comment(const std::string &text) {
   auto pair = key_and_value(text);
@@ -300,7 +319,7 @@ void McapLineSink::comment(const std::string &text) {
       }
     }
     if (words[0] == PACKET_HEALTH) {
-      diagnose(ros::health({clock_.now_ns(), ""}, device->serial, device->sensors, fields));
+      add(diagnostics_, ros::health({clock_.now_ns(), ""}, device->serial, device->sensors, fields));
     }
   } else if (device) {
     device_key(*device, key, value);
@@ -337,22 +356,19 @@ bool McapLineSink::put_row(const std::string &text) {
   clock_.row(row.contact ? row.contact->t_us : row.raw->t_us, row.time_us);
   Device &device = devices_[row.device];
   const ros::Header header = {clock_.now_ns(), device.frame_id};
-  auto put = [&](std::uint16_t channel, const std::string &message) {
-    writer_.message(channel, header.time_ns, message);
-  };
-  put(device.contact, ros::encode(header, row));
+  add(device.contact, ros::encode(header, row));
   if (row.contact) {
-    put(device.wrench, ros::wrench(header, row.contact->body.contact));
-    put(device.place, ros::place(header, row.contact->body.contact));
+    add(device.wrench, ros::wrench(header, row.contact->body.contact));
+    add(device.place, ros::place(header, row.contact->body.contact));
   }
   if (row.raw && std::min(device.x_mm.size(), device.y_mm.size()) >= sensor_count_) {
-    put(device.pressures, ros::pressures(header, row.raw->body.raw, device.x_mm, device.y_mm));
+    add(device.pressures, ros::pressures(header, row.raw->body.raw, device.x_mm, device.y_mm));
   }
   if (row.contact) {
     std::uint32_t warnings = row.contact->body.contact.flags & warning_flags();
     if (device.warnings != warnings) {
       device.warnings = warnings;
-      diagnose(ros::warnings({header.time_ns, ""}, device.serial, warnings));
+      add(diagnostics_, ros::warnings({header.time_ns, ""}, device.serial, warnings));
     }
   }
   return true;
@@ -362,41 +378,27 @@ McapLineSource::McapLineSource(std::string path, std::unique_ptr<ByteSource> byt
     : path_(std::move(path)), reader_(std::move(bytes)) {}
 
 bool McapLineSource::next(Line &line) {
-  mcap::Reader::Message message;
   try {
-    while (reader_.next(message)) {
-      bool is_line = message.type == full_name(LINE);
-      if (!is_line && message.type != full_name(CONTACT)) {
+    for (;;) {
+      const auto first = waiting_.begin();
+      if (first != waiting_.end() && (is_ended_ || first->first <= number_ + 1 || waiting_.size() > WAITING_MOST)) {
+        const auto next = waiting_.extract(first);
+        number_ = std::max(number_, next.key());
+        line = line_of(next.key(), next.mapped());
+        return true;
+      }
+      if (is_ended_) {
+        break;
+      }
+      mcap::Reader::Message message;
+      if (reader_.next(message)) {
+        take(std::move(message));
         continue;
       }
-      if (is_line) {
-        auto decoded = ros::decode_line(message.data);
-        if (!decoded || decoded->text.find('\n') != std::string::npos) {
-          throw mcap::Damage("a message on " + printable(message.topic) + " is damaged");
-        }
-        line = {decoded->number, decoded->text, decoded->torn};
-        if (!has_first_) {
-          has_first_ = true;
-          joint_ = line.text == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
-        }
-        if (!has_header_ && !trim(line.text).empty() && line.text[0] != '#') {
-          const auto columns = columns_of(line.text, joint_);
-          sensor_count_ = columns ? columns->sensor_count : std::uint8_t{0};
-          sets_ = columns ? columns->sets : LATER_SETS;
-          has_header_ = true;
-        }
-      } else {
-        auto row = ros::decode_row(message.data);
-        if (!row || !has_header_ || row->time_us.has_value() != joint_ ||
-            (row->raw && row->raw->body.raw.sensor_count != sensor_count_)) {
-          throw mcap::Damage("a message on " + printable(message.topic) +
-                             " is damaged, or of another version of this tool, which can convert "
-                             "it to CSV");
-        }
-        line = {row->number, text_of(*row), false};
+      is_ended_ = true;
+      if (!topic_.empty() && !reader_.is_torn()) {
+        waiting_.emplace(number_ + 1, line_message({number_ + 1, "# end: reason=topics", false}));
       }
-      number_ = line.number;
-      return true;
     }
   } catch (const mcap::Damage &damage) {
     throw Error(ErrorCode::damaged_line, path_ + ": " + damage.what());
@@ -413,6 +415,88 @@ bool McapLineSource::next(Line &line) {
   return false;
 }
 
+void McapLineSource::take(mcap::Reader::Message message) {
+  const bool is_contact = message.type == full_name(CONTACT);
+  if (!is_contact && message.type != full_name(LINE)) {
+    return;
+  }
+  if (const auto size = mcap::declared_size(message.data)) { /* of a recorder that packs each message */
+    std::string plain(std::min(*size, MESSAGE_MOST_bytes), '\0');
+    if (!mcap::unpack(message.data, plain)) {
+      throw mcap::Damage("a message on " + printable(message.topic) + " cannot be unpacked");
+    }
+    message.data = plain;
+  }
+  if (is_contact && topic_.empty() && !reader_.knows(full_name(LINE))) {
+    make_head(message);
+  }
+  if (topic_.empty()) {
+    waiting_.emplace(ros::line_number(message.data), std::move(message));
+  } else if (!is_contact) {
+    throw Error(ErrorCode::unread_kind,
+                path_ + ": chunks in another order than that of time, and no index: mcap recover FILE -o OUT");
+  } else if (message.topic == topic_) {
+    waiting_.emplace(number_ + waiting_.size() + 1, std::move(message));
+  } else {
+    throw Error(ErrorCode::unread_kind,
+                path_ + ": topics of several fingertips, and no lines of a recording. Take one: " +
+                    "mcap filter FILE -y '" + printable(topic_.substr(0, topic_.rfind('/'))) + "/.*' -o OUT");
+  }
+}
+
+/* Of a recording, by the first contact and what was read with it. */
+void McapLineSource::make_head(const mcap::Reader::Message &contact) {
+  topic_ = contact.topic;
+  const auto row = ros::decode_row(contact.data);
+  const std::uint8_t sensors = row && row->raw ? row->raw->body.raw.sensor_count : std::uint8_t{0};
+  std::vector<std::string> lines = {std::string(FIRST_WORDS) + FORMAT_OF_ONE, "# serial: " + serial_in(topic_),
+                                    "# sensors: " + std::to_string(sensors)};
+  const auto *cloud = reader_.with_last(full_name(PRESSURES));
+  for (std::size_t axis = 0; cloud && axis < 2; axis++) {
+    lines.push_back(axis == 0 ? "# x_mm:" : "# y_mm:");
+    for (double mm : ros::locations_mm(cloud->data, sensors, axis)) {
+      lines.back() += " " + shortest(static_cast<float>(mm));
+    }
+  }
+  lines.push_back(header_text(sensors));
+  for (const std::string &text : lines) {
+    const std::uint64_t number = waiting_.size() + 1;
+    waiting_.emplace(number, line_message({number, text, false}));
+  }
+}
+
+/* Throws mcap::Damage. */
+LineSource::Line McapLineSource::line_of(std::uint64_t number, const mcap::Reader::Message &message) {
+  if (message.type == full_name(CONTACT)) {
+    auto row = ros::decode_row(message.data);
+    if (row && !topic_.empty()) {
+      row->time_us.reset(); /* a recording of one */
+    }
+    if (!row || !has_header_ || row->time_us.has_value() != joint_ ||
+        (row->raw && row->raw->body.raw.sensor_count != sensor_count_)) {
+      throw mcap::Damage("a message on " + printable(message.topic) +
+                         " is damaged, or of another version of this tool, which can convert "
+                         "it to CSV");
+    }
+    return {number, text_of(*row), false};
+  }
+  auto decoded = ros::decode_line(message.data);
+  if (!decoded || decoded->text.find('\n') != std::string::npos) {
+    throw mcap::Damage("a message on " + printable(message.topic) + " is damaged");
+  }
+  if (!has_first_) {
+    has_first_ = true;
+    joint_ = decoded->text == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
+  }
+  if (!has_header_ && !trim(decoded->text).empty() && decoded->text[0] != '#') {
+    const auto columns = columns_of(decoded->text, joint_);
+    sensor_count_ = columns ? columns->sensor_count : std::uint8_t{0};
+    sets_ = columns ? columns->sets : LATER_SETS;
+    has_header_ = true;
+  }
+  return {number, decoded->text, decoded->torn};
+}
+
 std::string McapLineSource::text_of(const ros::Row &row) const {
   return (joint_ ? joint_cells(row.device, *row.time_us) : "") +
          row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr, sensor_count_, sets_);
@@ -420,13 +504,14 @@ std::string McapLineSource::text_of(const ros::Row &row) const {
 
 LineSource::Place McapLineSource::place() {
   auto place = reader_.place();
-  return {place.offset, place.message, number_};
+  return {place.offset, place.message, number_, waiting_};
 }
 
 void McapLineSource::go_to(const Place &place) {
   reader_.go_to({place.offset, place.message});
   number_ = place.number;
-  reported_torn_ = false;
+  waiting_ = std::any_cast<Waiting>(place.waiting);
+  is_ended_ = reported_torn_ = false;
 }
 
 } // namespace fingertip

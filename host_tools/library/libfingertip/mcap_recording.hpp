@@ -62,7 +62,7 @@ private:
   bool put_row(const std::string &text);
   void comment(const std::string &text);
   void device_key(Device &device, const std::string &key, const std::string &value);
-  void diagnose(const std::string &message);
+  void add(std::uint16_t channel, const std::string &message);
   /* The fingertip that a comment's key is about, whose number is taken off. */
   Device *device_of(std::string &key);
 
@@ -78,10 +78,13 @@ private:
   std::vector<Device> devices_;
   std::uint16_t lines_ = 0, diagnostics_ = 0; /* channels */
   LogClock clock_;
+  std::uint64_t last_ns_ = 0; /* of the messages */
   std::uint64_t unread_count_ = 0;
   std::string unread_; /* the first */
 };
 
+/* The lines in the order of their numbers, in whatever order a tool has written them. A file with the topics of one
+ * fingertip alone, as `ros2 bag record` makes them, gets a head and an end of what its first messages hold. */
 class McapLineSource : public LineSource {
 public:
   /* path: for messages. */
@@ -93,11 +96,19 @@ public:
   void go_to(const Place &place) override;
 
 private:
+  using Waiting = std::multimap<std::uint64_t, mcap::Reader::Message>;
+
+  void take(mcap::Reader::Message message);
+  void make_head(const mcap::Reader::Message &contact);
+  Line line_of(std::uint64_t number, const mcap::Reader::Message &message);
   std::string text_of(const ros::Row &row) const;
 
   std::string path_;
   mcap::Reader reader_;
   std::uint64_t number_ = 0;
+  Waiting waiting_;   /* by their numbers, for those before them */
+  std::string topic_; /* of contacts in a file without lines, whose numbers are counted here */
+  bool is_ended_ = false;
   bool joint_ = false;
   std::uint8_t sensor_count_ = 0;
   int sets_ = 0;                                /* of columns that came later, as in the header */

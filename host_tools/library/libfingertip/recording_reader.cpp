@@ -91,6 +91,27 @@ std::string format_of(const std::string &path, const std::string &line) {
                           : ": a " + kind.substr(0, kind.find(' ')) + ", not a recording"));
 }
 
+/* Throws Error for a file that may hold a recording, with what makes one of it that is read. */
+void refuse_others(const std::string &path, std::string_view start) {
+  constexpr std::pair<std::string_view, const char *> OTHERS[] = {
+      {"\x28\xb5\x2f\xfd", "packed as a whole by zstd: unzstd FILE"},
+      {"\x04\x22\x4d\x18", "packed as a whole by lz4: unlz4 FILE"},
+      {"\x1f\x8b\x08", "packed as a whole by gzip: gunzip FILE"},
+      {"BZh", "packed as a whole by bzip2: bunzip2 FILE"},
+      {"\xfd"
+       "7zXZ",
+       "packed as a whole by xz: unxz FILE"},
+      {"PK\3\4", "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV, with commas alone"},
+      {"SQLite format 3", "a bag of ROS 2 in SQLite; ros2 bag convert makes one in MCAP, packed as it is now"},
+      {std::string_view("\xff\xfe#", 3), "text in UTF-16, a spreadsheet's? Save it as UTF-8"},
+  };
+  for (const auto &[begin, what] : OTHERS) {
+    if (start.substr(0, begin.size()) == begin) {
+      throw Error(ErrorCode::unread_kind, path + ": " + what);
+    }
+  }
+}
+
 } // namespace
 
 bool is_mcap(ByteSource &bytes) {
@@ -104,6 +125,7 @@ bool is_recording(const std::string &path, ByteSource &bytes) {
   if (start.substr(0, 16).find(OUR_FILES) != std::string::npos || is_mcap(bytes)) {
     return true;
   }
+  refuse_others(path, start);
   if (start.find('\0') == std::string::npos) {
     throw Error(ErrorCode::not_a_recording,
                 path + (start.empty() ? ": is empty" : ": neither a recording nor bytes of a fingertip's line"));
@@ -115,6 +137,8 @@ std::unique_ptr<LineSource> lines_of(const std::string &path, std::unique_ptr<By
   if (is_mcap(*bytes)) {
     return std::make_unique<McapLineSource>(path, std::move(bytes));
   }
+  char start[16];
+  refuse_others(path, {start, bytes->read(0, start, sizeof start)});
   return std::make_unique<TextLines>(std::move(bytes));
 }
 

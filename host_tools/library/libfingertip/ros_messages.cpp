@@ -321,6 +321,28 @@ std::optional<Line> decode_line(std::string_view bytes) {
   return reader.is_good() ? std::optional(line) : std::nullopt;
 }
 
+std::uint64_t line_number(std::string_view bytes) {
+  CdrReader reader(bytes);
+  std::uint64_t number = 0;
+  skip_header(reader);
+  reader.get(number);
+  return number;
+}
+
+std::vector<double> locations_mm(std::string_view bytes, std::size_t sensors, std::size_t axis) {
+  constexpr std::size_t POINT_bytes = 16, LENGTH_bytes = 4, END_bytes = 1;
+  const std::size_t data = POINT_bytes * sensors;
+  std::vector<double> all;
+  if (bytes.size() < LENGTH_bytes + data + END_bytes ||
+      number_at<std::uint32_t>(bytes, bytes.size() - END_bytes - data - LENGTH_bytes) != data) {
+    return all;
+  }
+  for (std::size_t at = bytes.size() - END_bytes - data + 4 * axis; all.size() < sensors; at += POINT_bytes) {
+    all.push_back(std::round(double{number_at<float>(bytes, at)} * 1e6) / 1e3); /* to a micrometre */
+  }
+  return all;
+}
+
 std::string encode(const Header &header, const Row &row) {
   CdrWriter writer = begun(header);
   writer.put(row.number);

@@ -54,6 +54,10 @@ struct Line {
 };
 std::string encode(const Header &header, const Line &line);
 std::optional<Line> decode_line(std::string_view bytes);
+/* Of a Line or a Contact; 0 of what is neither. */
+std::uint64_t line_number(std::string_view bytes);
+/* x or y of each sensor (axis 0 or 1), in sensor_msgs/PointCloud2 as pressures makes it; none if it is another. */
+std::vector<double> locations_mm(std::string_view bytes, std::size_t sensors, std::size_t axis);
 
 /* fingertip_msgs/Contact: the packets of a row of a recording, one of them at least. */
 struct Row {

@@ -305,6 +305,19 @@ BLOCK_bytes, ROWS_AT_ONCE = 500_000, 1024  # about the same; more take no less t
 JOINT_COLUMNS = "device,time_us,"
 
 
+# What may hold a recording: how it begins, and what makes a file of it that is read.
+_OTHERS = {
+    b"\x28\xb5\x2f\xfd": "packed as a whole by zstd: unzstd FILE",
+    b"\x04\x22\x4d\x18": "packed as a whole by lz4: unlz4 FILE",
+    b"\x1f\x8b\x08": "packed as a whole by gzip: gunzip FILE",
+    b"BZh": "packed as a whole by bzip2: bunzip2 FILE",
+    b"\xfd7zXZ": "packed as a whole by xz: unxz FILE",
+    b"PK\3\4": "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV, with commas alone",
+    b"SQLite format 3": "a bag of ROS 2 in SQLite; ros2 bag convert makes one in MCAP, packed as it is now",
+    b"\xff\xfe#": "text in UTF-16, a spreadsheet's? Save it as UTF-8",
+}
+
+
 class Stretch(NamedTuple):
     """Lines one after the other, without their ends, and the first one's number."""
 
@@ -339,6 +352,9 @@ class _RecordingLines:
                     self.mcap = McapLineReader(self.path, self.progress)
                     yield from self.mcap.items()
                     return
+                for magic, what in _OTHERS.items():
+                    if start.startswith(magic):
+                        raise InputError(f"{self.path}: {what}")
                 file.seek(3 if start.startswith(b"\xef\xbb\xbf") else 0)
                 source: Any = file if b"\n" in start or b"\r" not in start else io.BytesIO(file.read().replace(b"\r", b"\n"))
                 size, read, shown, number = os.fstat(file.fileno()).st_size, 0, 0, 1

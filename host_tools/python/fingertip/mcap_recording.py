@@ -6,6 +6,8 @@ Needs the package mcap.
 import calendar
 import collections
 import functools
+import heapq
+import itertools
 import math
 import os
 import re
@@ -13,25 +15,28 @@ import struct
 import types
 import zlib
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from .errors import InputError
 from .frames import Q10
-from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS
+from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, SENSORS_MAX
 from .lines import LineFile, shortest
-from .messages import CONTACT_TYPE, DIAGNOSTICS_TYPE, FRAME_TOPICS, LINE_TYPE, TYPES, FrameMessages
+from .messages import CONTACT_TYPE, DIAGNOSTICS_TYPE, FRAME_TOPICS, LINE_TYPE, PRESSURES_TYPE, TYPES, FrameMessages
 from .messages import diagnostics, health_status, name_in_ros, stamp
-from .recorded import LISTS, Array, Rows
+from .recorded import LISTS, Array, Rows, header_text
 from .ros_messages import CDR_LITTLE_ENDIAN, PRIMITIVES, decode, encode, fields_of, schema_of
 
 LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can hold
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_ns = 1_000_000_000  # a chunk ends once it is that long, or has a megabyte
 CHUNK_MOST_bytes = 1 << 28  # of one that is read
+MESSAGE_MOST_bytes = 1 << 20  # of one that is packed by itself
+WAITING_MOST = 1 << 16  # lines that wait for one before them, before it counts as lost
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 3, 4, 5, 6, 15  # opcodes
+_ZSTD = b"\x28\xb5\x2f\xfd"
 
 _COUNTS = ("sequence", "flags", "sensors_used", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us", "total_us")
 _CONTACT_NAMES = (*CONTACT_COLUMNS, *LATER_COLUMNS)
@@ -49,6 +54,7 @@ def _mcap() -> types.ModuleType:
     try:
         import mcap.data_stream
         import mcap.exceptions
+        import mcap.reader
         import mcap.stream_reader
         import mcap.writer
         import zstandard  # noqa: F401
@@ -141,6 +147,7 @@ class McapLines:
             self._file.close()
             raise
         self._sequences: collections.Counter[int] = collections.Counter()  # by channel
+        self._log_ns = 0  # of the last message
         self._chunk_ns = 0  # when the chunk under way began
         self._number = 0
         self._head: list[str] | None = []  # until the row of columns
@@ -233,7 +240,7 @@ class McapLines:
             device.key(own, value)
 
     def _add(self, channel: int, data: bytes) -> None:
-        now_ns = self._clock.last_ns
+        now_ns = self._log_ns = max(self._log_ns, self._clock.last_ns)  # no tool changes the order
         if abs(now_ns - self._chunk_ns) >= CHUNK_ns:
             self._writer.flush()  # outlives the writer
             self._chunk_ns = now_ns
@@ -319,10 +326,11 @@ def _shortest(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
 
 
 class McapLineReader:
-    """The lines of a recording in an MCAP file, in the order in which they were written.
+    """The lines of a recording in an MCAP file, in the order of their numbers, in whatever order a tool has written them.
 
-    It reads from the begin and without the index, so that a file whose writer was killed reads as far as it goes. Raises InputError where
-    the file cannot be read, or is none of a recording.
+    It reads from the begin, so that a file whose writer was killed reads as far as it goes; chunks that are in another order than that of
+    time it reads by the index. A file with the topics of one fingertip alone, as `ros2 bag record` makes them, gets a head and an end of
+    what its first messages hold. Raises InputError where the file cannot be read, or is none of a recording.
     """
 
     def __init__(self, path: "str | os.PathLike[str]", progress: Callable[[float], None] | None = None) -> None:
@@ -332,6 +340,8 @@ class McapLineReader:
         self._schemas: dict[int, str] = {}  # names
         self._channels: dict[int, tuple[str, str]] = {}  # topic, name of the schema
         self._is_joint: bool | None = None
+        self._topic: str | None = None  # of contacts in a file without lines, whose numbers are counted here
+        self._count = 0
         self._has_header = self._is_torn = self._has_any = False
 
     def _damaged(self, topic: str, error: ValueError) -> Damaged:
@@ -339,8 +349,8 @@ class McapLineReader:
         return Damaged(f"{self.path}: {text}")
 
     def items(self) -> Iterator[Line | Contacts | Damaged]:
-        """The lines in the order in which they were written, rows many at a time; what is damaged is among them, at its place."""
-        for each in self._records():
+        """The lines in their order, rows many at a time; what is damaged is among them, at its place."""
+        for each in self._ordered():
             if isinstance(each, Contacts) and not self._has_header:
                 each = self._damaged(each.topics[0], ValueError("a row with no header line before it"))
             yield each if isinstance(each, (Contacts, Damaged)) else self._of_line(each)
@@ -349,15 +359,65 @@ class McapLineReader:
         if self._is_torn:
             yield Damaged(f"{self.path}: the last chunk is torn; use --salvage to do without")
 
+    def _ordered(self) -> Iterator[Line | Contacts | Damaged]:
+        """What is in the file, each line behind those before it."""
+        waits: list[tuple[int, int, Line | Contacts]] = []
+        last = order = 0
+        for each in itertools.chain(self._records(), (None,)):
+            if isinstance(each, Damaged):
+                yield each
+                continue
+            singles: list[tuple[int, Line | Contacts]] = []
+            if isinstance(each, Contacts):
+                numbers = np.array(each.numbers, "Q").astype(np.float64)
+                largest = np.maximum.accumulate(np.concatenate(([last], numbers)))
+                if not waits and (numbers <= largest[:-1] + 1).all():
+                    last = max(last, *each.numbers)
+                    yield each
+                    continue
+                singles = [(number, Contacts([number], [topic], [data])) for number, topic, data in zip(*each)]
+            elif each is not None:
+                singles = [(each[0], each)]
+            ready: list[Line | Contacts] = []
+            for number, single in singles:
+                order += 1
+                heapq.heappush(waits, (number, order, single))
+                while waits and (waits[0][0] <= last + 1 or len(waits) > WAITING_MOST):
+                    number, _, single = heapq.heappop(waits)
+                    last = max(last, number)
+                    ready.append(single)
+            if each is None:
+                ready = [single for _, _, single in sorted(waits)]
+            for are_contacts, group in itertools.groupby(ready, lambda single: isinstance(single, Contacts)):
+                yield from [Contacts(*(list(itertools.chain(*parts)) for parts in zip(*group)))] if are_contacts else group
+
+    def _order(self, file: BinaryIO) -> list[int]:
+        """A sound index has all channels; and where chunks are in another order than that of time, their places, by time."""
+        file.seek(0)
+        try:
+            summary = self._mcap.reader.make_reader(file).get_summary()
+        except (self._mcap.exceptions.McapError, ValueError, MemoryError, OSError, struct.error):
+            summary = None
+        if summary is None:
+            return []
+        times = [(each.message_start_time, each.chunk_start_offset) for each in summary.chunk_indexes]
+        self._schemas = {each.id: each.name.replace("/msg/", "/") for each in summary.schemas.values()}
+        self._channels = {each.id: (each.topic, self._schemas.get(each.schema_id, "")) for each in summary.channels.values()}
+        order = [place for _, place in sorted(times)]
+        return order if order != sorted(order) else []
+
     def _records(self) -> Iterator[Line | Contacts | Damaged]:
-        """What is in the file, in its order."""
-        struct_error, damage = struct.error, (ValueError, MemoryError, struct.error, self._mcap.stream_reader.zstandard.ZstdError)
+        """What is in the file, in its order, or that of its chunks by time."""
+        zstd_error, struct_error = self._mcap.stream_reader.zstandard.ZstdError, struct.error
+        damage = (ValueError, MemoryError, RuntimeError, EOFError, struct_error, zstd_error)
         try:
             with open(self.path, "rb") as file:
                 size = os.fstat(file.fileno()).st_size
                 if file.read(len(MAGIC)) != MAGIC:
                     raise InputError(f"{self.path}: no MCAP file; give one that fingertip has written")
-                at = len(MAGIC)
+                order = self._order(file)
+                follows = dict(zip(order, [*order[1:], size]))
+                at = file.seek(order[0] if order else len(MAGIC))
                 while at < size:  # a killed writer leaves whole chunks
                     head = file.read(9)
                     length = int.from_bytes(head[1:], "little")
@@ -365,7 +425,7 @@ class McapLineReader:
                         self._is_torn = True
                         return
                     if head[0] == _DATA_END:
-                        return
+                        break
                     if self._progress:
                         self._progress(at / size)
                     try:
@@ -376,7 +436,9 @@ class McapLineReader:
                     except damage as error:
                         what = "it ends within a field" if isinstance(error, struct_error) else error
                         yield Damaged(f"{self.path}: damaged at byte {at} ({what}); use --salvage to skip the chunk")
-                    at = file.seek(at + 9 + length)
+                    at = file.seek(follows.get(at, at + 9 + length))
+                if self._topic:
+                    yield self._count + 1, "# end: reason=topics", False
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
 
@@ -386,11 +448,11 @@ class McapLineReader:
         compression = content[32 : 32 + name]
         (length,) = struct.unpack_from("<Q", content, 32 + name)
         data = content[40 + name : 40 + name + length]
-        if compression == b"lz4":
-            raise InputError(f"{self.path}: chunks packed by lz4 are not read; pack them by zstd: mcap compress FILE -o OUT")
-        if len(data) < length or compression not in (b"", b"zstd") or size > CHUNK_MOST_bytes:
+        if len(data) < length or compression not in (b"", b"lz4", b"zstd") or size > CHUNK_MOST_bytes:
             raise ValueError(f'a chunk of {size} bytes, compression "{compression.decode("utf-8", "replace")[:20]}"')
-        if compression:
+        if compression == b"lz4":
+            data = self._mcap.stream_reader.lz4.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+        elif compression:
             zstandard = self._mcap.stream_reader.zstandard
             if zstandard.frame_content_size(data) not in (-1, size):
                 raise ValueError("its length is wrong")
@@ -399,13 +461,18 @@ class McapLineReader:
             raise ValueError("its length or CRC is wrong")
         return data
 
+    def _unpacked(self, message: bytes) -> bytes:
+        """Of a recorder that packs each message; any other as it is. Raises what zstandard raises."""
+        if message[:4] != _ZSTD:
+            return message
+        found: bytes = self._mcap.stream_reader.zstandard.ZstdDecompressor().decompress(message, max_output_size=MESSAGE_MOST_bytes)
+        return found
+
     def _messages(self, data: bytes) -> list[Line | Contacts | Damaged]:
         """Those that are wanted in a row of records. Raises ValueError, or what struct raises, where one of them is damaged."""
-        found: list[Line | Contacts | Damaged] = []
-        numbers: list[int] = []
-        topics: list[str] = []
-        rows: list[bytes] = []
+        wanted: list[tuple[str, str, bytes]] = []
         at, size, channels, unpack = 0, len(data), self._channels, struct.unpack_from
+        cloud = b""
         while at < size:
             length = unpack("<Q", data, at + 1)[0]
             begin, end = at + 9, at + 9 + length
@@ -420,30 +487,69 @@ class McapLineReader:
                 if channel is None:
                     raise ValueError("its channel is unknown")
                 topic, name = channel
-                begin += 22
-                if name == CONTACT_TYPE:
-                    frame_id = unpack("<I", data, begin + 12)[0] if end - begin > 16 else 0
-                    number_at = begin + 16 + frame_id + -(12 + frame_id) % 8
-                    if data[begin : begin + 4] == CDR_LITTLE_ENDIAN and frame_id and number_at + 8 <= end:
-                        numbers.append(unpack("<Q", data, number_at)[0])
-                        topics.append(topic)
-                        rows.append(data[begin:end])
-                        continue
                 if name in (CONTACT_TYPE, LINE_TYPE):
-                    if numbers:
-                        found.append(Contacts(numbers, topics, rows))
-                        numbers, topics, rows = [], [], []
-                    try:
-                        row = decode(name, data[begin:end])
-                        if "\n" in row.get("text", "\n"):
-                            raise ValueError("it ends within")
-                        found.append((row["line"], row["text"], row["torn"]))
-                    except ValueError as error:
-                        found.append(self._damaged(topic, error))
+                    wanted.append((name, topic, self._unpacked(data[begin + 22 : end])))
+                elif name == PRESSURES_TYPE and not cloud:
+                    cloud = data[begin + 22 : end]
             elif kind in (_SCHEMA, _CHANNEL):
                 self._declare(kind, data[begin:end])
-        self._has_any = self._has_any or bool(found) or bool(numbers)
+        found: list[Line | Contacts | Damaged] = []
+        contact = next((each for each in wanted if each[0] == CONTACT_TYPE), None)
+        if self._topic is None and contact and all(name != LINE_TYPE for _, name in channels.values()):
+            self._topic = contact[1]
+            found += self._made_head(contact[2], cloud)
+            self._count = len(found)
+        self._has_any = self._has_any or bool(wanted)
+        numbers: list[int] = []
+        topics: list[str] = []
+        rows: list[bytes] = []
+        for name, topic, message in wanted:
+            if name == CONTACT_TYPE and (number := self._number_of(message, topic)) is not None:
+                numbers.append(number)
+                topics.append(topic)
+                rows.append(message)
+                continue
+            if self._topic:
+                raise InputError(f"{self.path}: chunks in another order than that of time, and no index: mcap recover FILE -o OUT")
+            if numbers:
+                found.append(Contacts(numbers, topics, rows))
+                numbers, topics, rows = [], [], []
+            try:
+                row = decode(name, message)
+                if "\n" in row.get("text", "\n"):
+                    raise ValueError("it ends within")
+                found.append((row["line"], row["text"], row["torn"]))
+            except ValueError as error:
+                found.append(self._damaged(topic, error))
         return [*found, Contacts(numbers, topics, rows)] if numbers else found
+
+    def _number_of(self, message: bytes, topic: str) -> int | None:
+        """Of a contact's line; None where there is none in it."""
+        if self._topic is None:
+            frame_id = struct.unpack_from("<I", message, 12)[0] if len(message) > 16 else 0
+            at = 16 + frame_id + -(12 + frame_id) % 8
+            is_there = message[:4] == CDR_LITTLE_ENDIAN and frame_id and at + 8 <= len(message)
+            return int(struct.unpack_from("<Q", message, at)[0]) if is_there else None
+        if topic != self._topic:
+            take_one = f"mcap filter FILE -y '{self._topic.rpartition('/')[0]}/.*' -o OUT"
+            raise InputError(f"{self.path}: topics of several fingertips, and no lines of a recording. Take one: {take_one}")
+        self._count += 1
+        return self._count
+
+    def _made_head(self, contact: bytes, cloud: bytes) -> list[Line | Contacts | Damaged]:
+        """Of a recording, by the first contact and the pressures that were read with it."""
+        serial = (self._topic or "").split("/")[-2:][0]
+        try:
+            row = decode(CONTACT_TYPE, contact)
+            sensors = len(row["pressure_pa"]) * row["has_raw"]
+        except ValueError:
+            sensors = 0
+        lines = ["# fingertip-recording 1", f"# serial: {serial[1:] if re.match('s[0-9]', serial) else serial}", f"# sensors: {sensors}"]
+        data = cloud[-1 - 16 * sensors : -1]
+        if cloud and sensors <= SENSORS_MAX and cloud[-5 - 16 * sensors : -1 - 16 * sensors] == struct.pack("<I", 16 * sensors):
+            points = np.round(np.frombuffer(data, "<f4").reshape(-1, 4).astype(np.float64) * 1e6) / 1e3  # to a micrometre
+            lines += [f"# {name}: {' '.join(map(shortest, points[:, axis].tolist()))}" for axis, name in enumerate(("x_mm", "y_mm"))]
+        return [(number, text, False) for number, text in enumerate([*lines, header_text(sensors)], 1)]
 
     def _declare(self, kind: int, content: bytes) -> None:
         """Of schemas and channels only what they need is read: damage elsewhere costs none."""
@@ -489,6 +595,8 @@ class McapLineReader:
             padded = np.zeros((len(at), layout.itemsize), np.uint8)
             padded[:, : length - 4] = messages[:, : layout.itemsize]
             found = padded.view(layout).ravel()
+            if self._topic:
+                found["time_us"] = math.nan  # a recording of one
             table[at], fine[at] = rows.of_contacts(found, sensors, _shortest)
             devices[at], times_us[at] = found["device"], np.round(found["time_us"], 1)
             fine[at] &= (frame_ids == frame_ids[0]) & (np.isnan(found["time_us"]) != bool(self._is_joint)) & ~np.isinf(found["time_us"])

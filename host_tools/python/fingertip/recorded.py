@@ -121,6 +121,12 @@ def packet_of(text: str) -> tuple[str, dict[str, str]]:
     return kind, fields
 
 
+def header_text(sensors: int) -> str:
+    """The row of columns."""
+    pressures = (f"{kind}{k}_Pa" for kind in ("s", "tare") for k in range(sensors))
+    return ",".join(["t_us", "frame", *CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS, *pressures])
+
+
 class Rows:
     """The rows under a header, from t_us on. Raises ValueError where it is none."""
 

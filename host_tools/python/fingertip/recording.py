@@ -16,6 +16,7 @@ from .frames import Q10
 from .line import CONTACT_COLUMNS, INFO_KEYS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS
 from .lines import LineFile, shortest
 from .mcap_recording import McapLines
+from .recorded import header_text
 from .wire import Acknowledgement, Calibration, Contact, Health, Info, LineStatistics, Packet, PadProfile, Raw, SyncEdge, layout_of
 
 LATE_us = 250_000  # rows wait for this time for those of others
@@ -79,11 +80,6 @@ def _open_lines(path: "str | os.PathLike[str]", replace: bool) -> LineFile | Mca
     if os.fspath(path).lower().endswith(".mcap"):
         return McapLines(path, replace)
     return LineFile(path, replace)
-
-
-def _header(sensors: int) -> str:
-    pressures = (f"{kind}{k}_Pa" for kind in ("s", "tare") for k in range(sensors))
-    return ",".join(["t_us", "frame", *CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS, *pressures])
 
 
 def _own_keys(extra: Mapping[str, str | None] | None) -> dict[str, str]:
@@ -246,7 +242,7 @@ class _Writer:
                 self._file.line(text)
             for number, info in enumerate(infos):
                 self._members.append(_Member(self, info, raw_expected, number if columns else None))
-            self._file.line(columns + _header(infos[0].sensors))
+            self._file.line(columns + header_text(infos[0].sensors))
         except InputError:
             self.abandon()
             raise

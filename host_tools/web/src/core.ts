@@ -269,11 +269,16 @@ export class ClockFit extends Handle {
   }
 }
 
-/** Reads a file's bytes, fed from the first on; a CoreError states what is wrong with them. */
+/** Reads a file's bytes, fed as it wants them; a CoreError states what is wrong with them. */
 export class Reader extends Handle {
   /** size: of the file in bytes. */
   constructor(file_name: string, size: number) {
     super('reader', (name) => wasm.lend([file_name], (text) => wasm.call(name, text, BigInt(size), 0)));
+  }
+
+  /** Where in the file the bytes to feed next begin. */
+  get wants(): number {
+    return Number(this.call('wants'));
   }
 
   feed(bytes: Uint8Array): void {

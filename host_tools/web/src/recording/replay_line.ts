@@ -47,10 +47,11 @@ const ADVICE: Record<number, string> = {
   [-6]: 'choose another',
 };
 
+const AT_ONCE_bytes = 1 << 18;
+
 /** All that is in a file: a recording (.csv, .mcap), or bytes of a line (.ftr). Throws ReadError. */
 export async function* readItems(file: File): AsyncGenerator<Item, void, undefined> {
   const reader = new Reader(file.name, file.size);
-  const chunks = file.stream().getReader();
   let packets = 0;
   try {
     for (;;) {
@@ -59,7 +60,8 @@ export async function* readItems(file: File): AsyncGenerator<Item, void, undefin
         break;
       }
       if (item === null) {
-        reader.feed((await chunks.read()).value ?? new Uint8Array(0));
+        const from = reader.wants;
+        reader.feed(new Uint8Array(await file.slice(from, from + AT_ONCE_bytes).arrayBuffer()));
       } else if (item.packet) {
         packets++;
         yield { device: item.device, time_us: item.time_us, packet: item.packet };
@@ -75,7 +77,6 @@ export async function* readItems(file: File): AsyncGenerator<Item, void, undefin
       : error;
   } finally {
     reader.free();
-    await chunks.cancel();
   }
 }
 
