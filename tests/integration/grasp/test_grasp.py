@@ -107,7 +107,7 @@ class Usage(GraspTest):
             self.assertIn(words, err)
         err = self.run_cli("grasp", "--gripper", "claw", "--gripper-port", "x", status=2)[1]
         self.assertIn("no gripper model claw; there are 2f85, ", err)
-        self.assertIn("of grasp, --gripper-port", self.run_cli("grasp", "--gripper", "2f85", status=2)[1])
+        self.assertIn("of grasp, --gripper-port", self.run_cli("gripper", "info", "--model", "2f85", status=2)[1])
 
     def test_help_has_the_exit_statuses(self):
         out, _ = self.run_cli("grasp", "--help")
