@@ -8,6 +8,7 @@
     fingertip_V_ARCH.deb and two more     tool, library, development
     fingertip_tactile-V-...whl            Python
     fingertip-V-page.tar.gz               the page, for any server
+    fingertip-V-BOARD-circuit.tar.gz      circuit board: Gerbers, parts and placement; where KiCad 6 is installed
 
 The same commit gives the same bytes, in whatever folder. Times are that of the commit. It is built in a temporary folder, which stays there if
 something fails. clang 14 orders the landing pads of wasm32 by addresses in its memory. So compilers run without random ones, and the name of that
@@ -156,6 +157,13 @@ def main(argv):
     run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", work / "wheel", source / "host_tools/python")
     for wheel in (work / "wheel").glob("*.whl"):
         shutil.copy(wheel, out)
+
+    if pathlib.Path("/usr/lib/python3/dist-packages/pcbnew.py").exists():
+        print("circuit boards", flush=True)
+        run("/usr/bin/python3", source / "boards/drawing/fabricate.py", work / "circuit")
+        for folder in (work / "circuit").iterdir():
+            whole = f"{name}-{folder.name}-circuit"
+            (out / f"{whole}.tar.gz").write_bytes(packed(folder_as_tar(folder, whole, time_s)))
 
     files = sorted(path for path in out.iterdir() if path.is_file())
     sums = "".join(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files)

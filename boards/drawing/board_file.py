@@ -1,23 +1,9 @@
-#!/usr/bin/env python3
-"""Writes circuit boards for KiCad: parts by layout.py, tracks by route.py. The same descriptors give the same bytes.
+"""A circuit board for KiCad: parts by layout.py, tracks by route.py. For draw.py."""
 
-board_file.py [FOLDER]    boards/<board>/pcb/, or FOLDER/<board>/pcb/, of each board that has such a folder: seconds for each
-
-Then draw.py writes what follows from them: picture, list of parts, placement file. fabricate.py makes what a board house wants.
-"""
-
-import json
-import pathlib
-import sys
-
-HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE))
-import geometry
 import layout
 import mould
 import pcb_check
 import route
-import wiring
 from sheet import number
 
 THICK_mm = 1.6
@@ -109,25 +95,3 @@ def board_text(board, sensors):
     none = "(keepout (tracks not_allowed) (vias not_allowed) (pads allowed) (copperpour not_allowed) (footprints allowed)) (fill)"
     lines += [zone('(net 0) (net_name "")', "B", none, rectangle) for rectangle in under]
     return "\n".join([*lines, ")"]) + "\n"
-
-
-def main(argv, root=HERE.parents[1]):
-    if len(argv) > 1:
-        print(__doc__, file=sys.stderr)
-        return 2
-    for path in sorted(root.glob("boards/*/pcb")):
-        name = path.parent.name
-        try:
-            board = wiring.board_of(name, json.loads(path.with_name("board.json").read_text(encoding="utf-8")))
-            text = board_text(board, geometry.places(root))
-        except (wiring.Unwired, route.Unrouted) as error:
-            print(f"board_file.py: {name}: {error}", file=sys.stderr)
-            return 1
-        folder = pathlib.Path(argv[0]) / name / "pcb" if argv else path
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / f"fingertip-{name}.kicad_pcb").write_text(text, encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -3,6 +3,7 @@
 
 draw.py            writes them
 draw.py --check    lists those that differ from what would be written
+draw.py --lay      lays circuit boards: seconds for each boards/<board>/pcb, into the .kicad_pcb there; then run draw.py
 
 boards/<board>/wiring.svg                  from board.json
 boards/<board>/README.md, wiring and parts from board.json and parts.json
@@ -18,6 +19,7 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
+import board_file
 import geometry
 import mould
 import pcb
@@ -58,6 +60,15 @@ def parts_table(board, parts):
     return "\n".join(rows) + "\n"
 
 
+def laid(root):
+    """{path: .kicad_pcb}"""
+    found, sensors = {}, geometry.places(root)
+    for path in sorted(root.glob("boards/*/pcb")):
+        name, descriptor = path.parent.name, json.loads(path.with_name("board.json").read_text(encoding="utf-8"))
+        found[path / f"fingertip-{name}.kicad_pcb"] = board_file.board_text(wiring.board_of(name, descriptor), sensors)
+    return found
+
+
 def drawings(root):
     """{path: its content}."""
     boards = root / "boards"
@@ -80,15 +91,15 @@ def drawings(root):
 
 
 def main(argv, root=HERE.parents[1]):
-    if argv not in ([], ["--check"]):
+    if argv not in ([], ["--check"], ["--lay"]):
         print(__doc__, file=sys.stderr)
         return 2
     try:
-        found = drawings(root)
+        found = laid(root) if argv == ["--lay"] else drawings(root)
     except wiring.Unwired as error:
         print(f"draw.py: {error}", file=sys.stderr)
         return 1
-    if not argv:
+    if argv != ["--check"]:
         for path, text in found.items():
             path.write_text(text, encoding="utf-8")
         return 0

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What a board house wants of each circuit board, by KiCad's own plotter: Gerbers and drill files in one zip, list of parts, placement file.
+"""What a board house wants of each circuit board, by KiCad's own plotter: Gerbers and drill files in one zip, list of parts, placement file, picture.
 
 fabricate.py FOLDER    writes FOLDER/<board>/ for each boards/<board>/pcb, and prints what KiCad's rule check finds: it shall be nothing
 
@@ -18,21 +18,20 @@ import pcbnew
 
 LAYERS = ("F_Cu", "B_Cu", "F_Mask", "B_Mask", "F_Paste", "B_Paste", "F_SilkS", "B_SilkS", "Edge_Cuts")
 DATED = re.compile(
-    r"^(G04 Created by KiCad|%TF\.(Creation|Generation|ProjectId)|; DRILL file|; #@! TF\.(Creation|Generation)).*\n", re.MULTILINE
+    r"^(\*\* (Created on|Drc report)|G04 Created by KiCad|%TF\.(Creation|Generation|ProjectId)|; DRILL file|; #@! TF\.(Creation|Generation)).*\n",
+    re.MULTILINE,
 )
 
 
-def filled(path):
+def judged(path, report):
+    """The board with its zones filled, and what KiCad's rule check counts. report: the file that its words go to."""
     board = pcbnew.LoadBoard(str(path))
     pcbnew.ZONE_FILLER(board).Fill(board.Zones())
-    return board
-
-
-def judged(board, report):
-    """What KiCad's rule check counts. report: the file that its words go to."""
     pcbnew.WriteDRCReport(board, str(report), pcbnew.EDA_UNITS_MILLIMETRES, True)
-    violations, unconnected, footprints = map(int, re.findall(r"\*\* Found (\d+)", pathlib.Path(report).read_text(encoding="utf-8")))
-    return {"drc_violations": violations + footprints, "unconnected": unconnected}
+    text = DATED.sub("", report.read_text(encoding="utf-8"))
+    report.write_text(text, encoding="utf-8")
+    violations, unconnected, footprints = map(int, re.findall(r"\*\* Found (\d+)", text))
+    return board, {"drc_violations": violations + footprints, "unconnected": unconnected}
 
 
 def plotted(board, folder):
@@ -63,18 +62,14 @@ def main(argv):
     for path in sorted(pathlib.Path(__file__).resolve().parents[1].glob("*/pcb/*.kicad_pcb")):
         folder = pathlib.Path(argv[0]) / path.parents[1].name
         folder.mkdir(parents=True, exist_ok=True)
-        board = filled(path)
         with tempfile.TemporaryDirectory() as scratch, zipfile.ZipFile(folder / f"{path.stem}-gerbers.zip", "w") as out:
+            board, found = judged(path, folder / "rule-check.txt")
             for name, text in plotted(board, scratch).items():
                 out.writestr(zipfile.ZipInfo(name), text)
-            report = pathlib.Path(scratch) / "rule-check.txt"
-            found = judged(board, report)
-            if any(found.values()):
-                wrong += 1
-                print(report.read_text(encoding="utf-8"), file=sys.stderr)
-        for table in path.parent.glob("*.csv"):
-            shutil.copy(table, folder)
+        for file in (*path.parent.glob("*.csv"), *path.parent.glob("*.svg")):
+            shutil.copy(file, folder)
         print(f"{folder}: {json.dumps(found)}")
+        wrong += sum(found.values())
     return 1 if wrong else 0
 
 

@@ -34,7 +34,7 @@ def placement(board):
 def plate(board, middle):
     """The base plate that the board needs, from below: a hole for each sensor, and a pocket for what else is on the front."""
     (left, top), (right, bottom) = board.outline
-    words = f"base plate, from below: holes {HOLE_mm} mm for sensors, pockets {POCKET_mm} mm deep"
+    words = f"base plate, from below: holes {HOLE_mm}, pockets {POCKET_mm} deep"
     lines = [sheet.rectangle(middle, 0, right - left, bottom - top), sheet.text(middle + left, top - 2, words)]
     lines += [sheet.circle(middle - x, y, diameter) for x, y, diameter in board.holes]
     for part, (x, y, _, back, _) in board.parts.items():

@@ -7,15 +7,13 @@ An edge is (node, higher node); from one layer to the other it is a via.
 import collections
 import heapq
 
+import wiring
+
 GRID_um, TRACK_um, VIA_um, DRILL_um = 250, 250, 600, 300
 CLEARANCE_um, EDGE_um = 190, 500  # copper to copper, and to the board's edge
 STEP, DIAGONAL, TURN, THROUGH, CROSS, MET = 10, 14, 3, 120, 50, 15  # costs; the last is added where nets met
 TAKEN, FAR, ROUNDS = -1, 10**9, 3000
 EIGHT = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
-
-
-class Unrouted(Exception):
-    """A pad is walled in, or nets still cross after all rounds."""
 
 
 class Grid:
@@ -108,7 +106,7 @@ class Grid:
                 if cost < paid.get(to, FAR):
                     paid[to], came[to] = cost, node
                     heapq.heappush(heap, (cost + rest(to), to))
-        raise Unrouted(f"a pad of net {net} is walled in")
+        raise wiring.Unwired(f"a pad of net {net} is walled in")
 
     def drawn(self, edges):
         """Tracks [(x0, y0, x1, y1, layer)] and vias [(x, y)] of a net."""
@@ -182,4 +180,4 @@ def route(size, pads, screws, no_vias, no_back):
             if meets:
                 grid.count(taken.pop(key), -1)
                 waiting.append(laid.pop(key)[0])
-    raise Unrouted(f"{len(waiting)} connections still cross others after {ROUNDS} rounds")
+    raise wiring.Unwired(f"{len(waiting)} connections still cross others after {ROUNDS} rounds")

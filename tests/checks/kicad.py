@@ -34,5 +34,5 @@ def lands_off(board):
 
 
 for path in sys.argv[1:]:
-    board = fabricate.filled(path)
-    print(json.dumps(fabricate.judged(board, f"{path}.txt") | {"lands_off": lands_off(board)}))
+    board, figures = fabricate.judged(path, pathlib.Path(f"{path}.txt"))
+    print(json.dumps(figures | {"lands_off": lands_off(board)}))
