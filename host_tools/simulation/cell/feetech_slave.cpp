@@ -2,7 +2,7 @@
 // answers to the instructions of the maker's SDK.
 #include "grasp/gripper/feetech.hpp"
 #include "grasp/gripper/feetech_table.hpp"
-#include "simulation/cell/gripper_slave.hpp"
+#include "simulation/cell/gripper_server.hpp"
 
 #include <algorithm>
 #include <array>

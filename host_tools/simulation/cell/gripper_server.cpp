@@ -1,7 +1,5 @@
 #include "simulation/cell/gripper_server.hpp"
 
-#include "simulation/cell/gripper_slave.hpp"
-
 #include <algorithm>
 #include <cmath>
 
@@ -40,18 +38,12 @@ GripperServer::GripperServer(GripperMotion &motion, const Options &options)
                                                                             : feetech_slave(motion, options)),
       port_(options.link), stepped_at_(host_now()) {}
 
-GripperServer::~GripperServer() = default;
-
-void GripperServer::trouble(const LineTrouble &trouble) { trouble_ = trouble; }
-
 void GripperServer::power(bool on) {
   if (power_ != on) {
     slave_->lose_power();
   }
   power_ = on;
 }
-
-void GripperServer::fail(std::uint8_t fault) { slave_->fail(fault); }
 
 void GripperServer::take() {
   Bytes frame;

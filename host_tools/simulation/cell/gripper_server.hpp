@@ -1,5 +1,5 @@
-// A simulated gripper on a port of its own, with its own protocol: libmodbus as a slave for
-// Robotiq's, packets for Feetech's. What its line can suffer is part of it.
+// A simulated gripper on a port of its own, with its own protocol: Modbus RTU for Robotiq's, packets
+// for Feetech's. What its line can suffer is part of it.
 //
 //   GripperMotion motion(GripperServer::mechanics(model));
 //   GripperServer server(motion, {.model = model});
@@ -58,8 +58,6 @@ public:
 
   // motion outlives it. Throws Error: an unknown model; no port to be had.
   GripperServer(GripperMotion &motion, const Options &options);
-  // The port goes.
-  ~GripperServer();
   GripperServer(const GripperServer &) = delete;
   GripperServer &operator=(const GripperServer &) = delete;
 
@@ -70,16 +68,29 @@ public:
   // Waits at most this long for something to do, and does it.
   void step(std::chrono::microseconds longest_wait);
 
-  void trouble(const LineTrouble &trouble);
+  void trouble(const LineTrouble &trouble) { trouble_ = trouble; }
   // Without power it does not answer, and afterwards it is not active.
   void power(bool on);
   // When bytes last came.
   HostTime heard_at() const { return came_at_; }
   // The gripper's own fault, by the maker's code.
-  void fail(std::uint8_t fault);
+  void fail(std::uint8_t fault) { slave_->fail(fault); }
 
-  // The protocol behind the line.
-  class Slave;
+  // What is behind the line: a protocol and its registers.
+  class Slave {
+  public:
+    using Bytes = std::vector<std::uint8_t>;
+    virtual ~Slave() = default;
+    virtual double baud() const = 0;
+    // Takes a whole frame out of what came; false: there is none yet.
+    virtual bool take_frame(Bytes *came, Bytes *frame) = 0;
+    // Empty: it does not answer.
+    virtual Bytes answer(const Bytes &frame, bool refuse) = 0;
+    virtual Bytes of_other_slave(Bytes answer) = 0;
+    // Without power all that was written is lost.
+    virtual void lose_power() = 0;
+    virtual void fail(std::uint8_t fault) = 0;
+  };
 
 private:
   struct Answer {
@@ -100,5 +111,8 @@ private:
   HostTime came_at_{}, stepped_at_;
   std::deque<Answer> answers_;
 };
+
+std::unique_ptr<GripperServer::Slave> robotiq_slave(GripperMotion &motion, const GripperServer::Options &options);
+std::unique_ptr<GripperServer::Slave> feetech_slave(GripperMotion &motion, const GripperServer::Options &options);
 
 } // namespace fingertip

@@ -1,20 +1,16 @@
-// A simulated Robotiq gripper: libmodbus as a slave, and registers (gripper/robotiq_registers.hpp) over its motion.
+// A simulated Robotiq gripper: a Modbus slave of its own, which libmodbus on the other end judges, and registers
+// (gripper/robotiq_registers.hpp) over its motion.
 //
 // After the manuals: activation begins where rACT rises and takes its time; a move before gives gFLT 7, one while
 // it goes on gFLT 5 and is done afterwards. Assumed, for nothing is public: gFLT 9 is reported once, by the first
 // answer after a second of silence, and what moves goes on; a move begins where a register of it changes or rGTO
 // rises. Left out: automatic release, which the driver never asks for.
 #include "grasp/gripper/robotiq_registers.hpp"
-#include "simulation/cell/gripper_slave.hpp"
+#include "simulation/cell/gripper_server.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
-#include <modbus.h>
-#include <new>
-#include <sys/socket.h>
-#include <unistd.h>
 
 namespace fingertip {
 
@@ -24,10 +20,16 @@ namespace {
 
 constexpr double FULL_CURRENT_A = 1.0;
 
-std::uint16_t modbus_crc(const std::vector<std::uint8_t> &bytes, std::size_t count) {
+constexpr std::uint8_t WRITE = 16, WRITE_AND_READ = 23; // functions
+constexpr std::uint8_t EXCEPTION = 0x80, ILLEGAL_FUNCTION = 1;
+
+using Bytes = std::vector<std::uint8_t>;
+
+// 0 of a frame with its own.
+std::uint16_t crc_of(const Bytes &bytes) {
   std::uint16_t crc = 0xFFFF;
-  for (std::size_t i = 0; i < count; i++) {
-    crc ^= bytes[i];
+  for (const std::uint8_t byte : bytes) {
+    crc ^= byte;
     for (int bit = 0; bit < 8; bit++) {
       crc = static_cast<std::uint16_t>(crc & 1 ? crc >> 1 ^ 0xA001 : crc >> 1);
     }
@@ -35,26 +37,18 @@ std::uint16_t modbus_crc(const std::vector<std::uint8_t> &bytes, std::size_t cou
   return crc;
 }
 
-// libmodbus sits at one end of a pair of sockets, so that its answers can be kept and spoilt.
+Bytes with_crc(Bytes bytes) {
+  const std::uint16_t crc = crc_of(bytes);
+  bytes.push_back(static_cast<std::uint8_t>(crc & 0xFF));
+  bytes.push_back(static_cast<std::uint8_t>(crc >> 8));
+  return bytes;
+}
+
 class RobotiqSlave : public GripperServer::Slave {
 public:
   RobotiqSlave(GripperMotion &motion, const GripperServer::Options &options)
-      : motion_(motion), functions_(options.functions), modbus_(modbus_new_rtu("/dev/null", BAUD, 'N', 8, 1)),
-        mapping_(modbus_mapping_new_start_address(0, 0, 0, 0, COMMAND_REGISTER, MAPPED, STATUS_REGISTER, REGISTERS)) {
-    if (modbus_ == nullptr || mapping_ == nullptr || socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK, 0, ends_) != 0) {
-      throw std::bad_alloc();
-    }
-    modbus_set_slave(modbus_, options.slave == 0 ? SLAVE : options.slave);
-    modbus_set_socket(modbus_, ends_[0]);
-    modbus_set_indication_timeout(modbus_, 0, 1000);
-    modbus_set_byte_timeout(modbus_, 0, 1000);
-  }
-  ~RobotiqSlave() override {
-    modbus_mapping_free(mapping_);
-    modbus_free(modbus_);
-    close(ends_[0]);
-    close(ends_[1]);
-  }
+      : motion_(motion), functions_(options.functions),
+        slave_(static_cast<std::uint8_t>(options.slave == 0 ? SLAVE : options.slave)) {}
 
   double baud() const override { return BAUD; }
 
@@ -63,7 +57,7 @@ public:
     if (came->size() < 2) {
       return false;
     }
-    const std::size_t counted = (*came)[1] == 16 ? 6 : (*came)[1] == 23 ? 10 : 0;
+    const std::size_t counted = (*came)[1] == WRITE ? 6 : (*came)[1] == WRITE_AND_READ ? 10 : 0;
     if (counted != 0) {
       if (came->size() <= counted) {
         return false;
@@ -79,39 +73,22 @@ public:
   }
 
   Bytes answer(const Bytes &frame, bool refuse) override {
-    Bytes bytes(MODBUS_RTU_MAX_ADU_LENGTH);
-    while (recv(ends_[0], bytes.data(), bytes.size(), 0) > 0) {
-    }
-    if (send(ends_[1], frame.data(), frame.size(), 0) != static_cast<ssize_t>(frame.size())) {
-      return {};
-    }
-    Bytes query(MODBUS_RTU_MAX_ADU_LENGTH);
-    const int length = modbus_receive(modbus_, query.data());
-    if (length <= 0) {
-      return {}; // damaged, or another's
+    if (frame[0] != slave_ || crc_of(frame) != 0) {
+      return {}; // another's, or damaged
     }
     silence_ = silence_ || motion_.time_s() - heard_s_ >= SILENCE_s;
     heard_s_ = motion_.time_s();
     if (refuse) {
-      modbus_reply_exception(modbus_, query.data(), MODBUS_EXCEPTION_ILLEGAL_FUNCTION);
-    } else {
-      if (!obey(query)) {
-        return {};
-      }
-      modbus_reply(modbus_, query.data(), length, mapping_);
-      silence_ = false;
+      return with_crc({slave_, static_cast<std::uint8_t>(frame[1] | EXCEPTION), ILLEGAL_FUNCTION});
     }
-    const ssize_t size = recv(ends_[1], bytes.data(), bytes.size(), 0);
-    bytes.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
-    return bytes;
+    const Bytes answer = obey(frame);
+    silence_ = silence_ && answer.empty();
+    return answer.empty() ? answer : with_crc(answer);
   }
 
   Bytes of_other_slave(Bytes answer) override {
     answer[0]++;
-    const std::uint16_t crc = modbus_crc(answer, answer.size() - 2);
-    answer[answer.size() - 2] = static_cast<std::uint8_t>(crc & 0xFF);
-    answer[answer.size() - 1] = static_cast<std::uint8_t>(crc >> 8);
-    return answer;
+    return with_crc({answer.begin(), answer.end() - 2});
   }
   void lose_power() override {
     command_ = done_ = {};
@@ -125,36 +102,36 @@ public:
 
 private:
   using Registers = std::array<std::uint16_t, REGISTERS>;
-  static constexpr int MAPPED = STATUS_REGISTER + REGISTERS - COMMAND_REGISTER;
 
-  // False: a function or register that it does not know, which it does not answer.
-  bool obey(const Bytes &query) {
-    const auto word = [&](std::size_t at) { return query[at] << 8 | query[at + 1]; };
+  // Its answer without the checksum; empty to a function or register that it does not know.
+  Bytes obey(const Bytes &frame) {
+    const auto word = [&](std::size_t at) { return frame[at] << 8 | frame[at + 1]; };
     const auto all_in = [](int address, int count, int first) {
       return count > 0 && address >= first && address + count <= first + REGISTERS;
     };
-    const int function = query[1];
-    if (std::find(functions_.begin(), functions_.end(), function) == functions_.end()) {
-      return false;
+    const int function = frame[1];
+    const bool writes = function == WRITE || function == WRITE_AND_READ, reads = function != WRITE;
+    const std::size_t at = reads ? 6 : 2;
+    if (std::find(functions_.begin(), functions_.end(), function) == functions_.end() ||
+        (reads && !all_in(word(2), word(4), STATUS_REGISTER)) ||
+        (writes && !(all_in(word(at), word(at + 2), COMMAND_REGISTER) && frame[at + 4] == 2 * word(at + 2)))) {
+      return {};
     }
-    if (function != 16 && !all_in(word(2), word(4), STATUS_REGISTER)) {
-      return false;
-    }
-    if (function == 16 || function == 23) {
-      const std::size_t at = function == 16 ? 2 : 6, values = function == 16 ? 7 : 11;
-      if (!all_in(word(at), word(at + 2), COMMAND_REGISTER)) {
-        return false;
-      }
-      for (int i = 0; i < word(at + 2); i++) {
-        command_.at(static_cast<std::size_t>(word(at) + i - COMMAND_REGISTER)) =
-            static_cast<std::uint16_t>(word(values + 2 * static_cast<std::size_t>(i)));
-      }
+    for (int i = 0; writes && i < word(at + 2); i++) {
+      command_.at(static_cast<std::size_t>(word(at) + i - COMMAND_REGISTER)) =
+          static_cast<std::uint16_t>(word(at + 5 + 2 * static_cast<std::size_t>(i)));
     }
     update();
-    const Registers status = this->status();
-    std::copy(status.begin(), status.end(), mapping_->tab_input_registers);
-    std::copy(status.begin(), status.end(), mapping_->tab_registers + STATUS_REGISTER - COMMAND_REGISTER);
-    return true;
+    if (!reads) {
+      return {frame.begin(), frame.begin() + 6};
+    }
+    const Registers registers = status();
+    Bytes answer = {slave_, frame[1], static_cast<std::uint8_t>(2 * word(4))};
+    for (int i = word(2) - STATUS_REGISTER; i < word(2) - STATUS_REGISTER + word(4); i++) {
+      const std::uint16_t value = registers[static_cast<std::size_t>(i)];
+      answer.insert(answer.end(), {static_cast<std::uint8_t>(value >> 8), static_cast<std::uint8_t>(value & 0xFF)});
+    }
+    return answer;
   }
 
   bool has(std::uint16_t bit) const { return (command_[0] & bit) != 0; }
@@ -226,9 +203,7 @@ private:
   bool silence_ = false; // a second of it, not reported yet
   std::uint8_t failed_ = NO_FAULT;
   std::vector<int> functions_;
-  modbus_t *modbus_;
-  modbus_mapping_t *mapping_;
-  int ends_[2] = {-1, -1};
+  std::uint8_t slave_;
 };
 
 } // namespace
