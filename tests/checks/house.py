@@ -194,7 +194,7 @@ def measure(root):
     own_line = ("firmware/wire/",)
     boards = [path.parent.name for path in sorted(root.glob("boards/*/main.c")) if path.parent.name != "native"]
     text = (root / "host_tools/grasp/gripper/models.cpp").read_text(encoding="utf-8")
-    models = re.findall(r'(?:\.model = |feetech_traits\()"(\w+)"', text)
+    models = re.findall(r'(?:robotiq|feetech)_traits\("(\w+)"', text)
     if not boards or not models:
         raise SystemExit("house.py: found no board or no gripper; does it still look in the right place?")
     listed = [(kind, [field["name"] for field in packet.get("fields", ())]) for kind, packet in line["packet"].items()]

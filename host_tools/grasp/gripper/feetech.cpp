@@ -1,7 +1,6 @@
 #include "grasp/gripper/feetech.hpp"
 
 #include "grasp/gripper/common.hpp"
-#include "grasp/gripper/feetech_table.hpp"
 #include "libfingertip/clock.hpp"
 #include "libfingertip/text.hpp"
 
@@ -9,8 +8,67 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 namespace fingertip {
+
+namespace feetech {
+
+namespace {
+
+constexpr std::size_t HEAD = 4; // FF FF id length
+constexpr std::uint8_t LEAST_LENGTH = 2;
+
+std::uint8_t checksum(Bytes::const_iterator from, Bytes::const_iterator to) {
+  return static_cast<std::uint8_t>(~std::accumulate(from, to, 0u));
+}
+
+} // namespace
+
+Bytes encoded(const Packet &packet) {
+  const auto length = static_cast<std::uint8_t>(packet.parameters.size() + LEAST_LENGTH);
+  Bytes bytes = {0xFF, 0xFF, packet.id, length, packet.code};
+  bytes.insert(bytes.end(), packet.parameters.begin(), packet.parameters.end());
+  bytes.push_back(checksum(bytes.begin() + 2, bytes.end()));
+  return bytes;
+}
+
+std::optional<Packet> take_packet(Bytes *bytes, std::size_t *skipped) {
+  std::size_t at = 0;
+  std::optional<Packet> packet;
+  for (; at < bytes->size() && !packet; at++) {
+    const std::size_t left = bytes->size() - at;
+    const Bytes::const_iterator begin = bytes->begin() + static_cast<std::ptrdiff_t>(at);
+    if (begin[0] != 0xFF || (left > 1 && begin[1] != 0xFF)) {
+      continue;
+    }
+    if (left > 2 && begin[2] == 0xFF) {
+      continue; // the head begins a byte later
+    }
+    if (left < HEAD) {
+      break;
+    }
+    if (begin[3] < LEAST_LENGTH) {
+      continue;
+    }
+    const std::ptrdiff_t size = static_cast<std::ptrdiff_t>(HEAD) + begin[3];
+    if (static_cast<std::ptrdiff_t>(left) < size) {
+      break;
+    }
+    if (checksum(begin + 2, begin + size - 1) != begin[size - 1]) {
+      continue;
+    }
+    packet = Packet{begin[2], begin[4], Bytes(begin + 5, begin + size - 1)};
+    *skipped += at;
+    bytes->erase(bytes->begin(), begin + size);
+    return packet;
+  }
+  *skipped += at;
+  bytes->erase(bytes->begin(), bytes->begin() + static_cast<std::ptrdiff_t>(at));
+  return packet;
+}
+
+} // namespace feetech
 
 using namespace feetech;
 

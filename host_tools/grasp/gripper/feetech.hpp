@@ -9,7 +9,7 @@
 // jaw. This is only a guess of the force in newtons: friction in the gears is at least as large.
 #pragma once
 
-#include "grasp/gripper/feetech_packet.hpp"
+#include "grasp/gripper/feetech_table.hpp"
 #include "grasp/gripper/gripper.hpp"
 #include "grasp/gripper/serial_line.hpp"
 #include "libfingertip/clock.hpp"

@@ -12,9 +12,26 @@ struct Model {
   std::unique_ptr<Gripper> (*open)(const GripperWay &way);
 };
 
-template <typename Driver> Model driven_by(GripperTraits traits) {
-  return {std::move(traits),
-          [](const GripperWay &way) -> std::unique_ptr<Gripper> { return std::make_unique<Driver>(way); }};
+template <typename Driver> std::unique_ptr<Gripper> driven_by(const GripperWay &way) {
+  return std::make_unique<Driver>(way);
+}
+
+struct Range {
+  double low, high;
+};
+
+Model robotiq_traits(const char *model, double stroke_mm, double deadband_mm, Range speed_mm_s, Range force_N) {
+  return {{.model = model,
+           .stroke_mm = stroke_mm,
+           .step_mm = stroke_mm / 227,
+           .deadband_mm = deadband_mm,
+           .speed_min_mm_s = speed_mm_s.low,
+           .speed_max_mm_s = speed_mm_s.high,
+           .force_min_N = force_N.low,
+           .force_max_N = force_N.high,
+           .latency_s = 0.025,
+           .poll_s = 0.005},
+          driven_by<RobotiqGripper>};
 }
 
 /* Strokes, speeds and forces: Robotiq, "2F-85 & 2F-140 Instruction Manual" and "Hand-E Instruction
@@ -24,46 +41,17 @@ template <typename Driver> Model driven_by(GripperTraits traits) {
  * 200 Hz by the manuals. Latencies are assumptions; no figure is public. */
 const std::vector<Model> &models() {
   static const std::vector<Model> all = {
-      driven_by<RobotiqGripper>({.model = "2f85",
-                                 .stroke_mm = 85.0,
-                                 .step_mm = 85.0 / 227,
-                                 .deadband_mm = 0.4,
-                                 .speed_min_mm_s = 20.0,
-                                 .speed_max_mm_s = 150.0,
-                                 .force_min_N = 20.0,
-                                 .force_max_N = 235.0,
-                                 .latency_s = 0.025,
-                                 .poll_s = 0.005}),
-      driven_by<RobotiqGripper>({.model = "2f140",
-                                 .stroke_mm = 140.0,
-                                 .step_mm = 140.0 / 227,
-                                 .deadband_mm = 0.65,
-                                 .speed_min_mm_s = 30.0,
-                                 .speed_max_mm_s = 250.0,
-                                 .force_min_N = 10.0,
-                                 .force_max_N = 125.0,
-                                 .latency_s = 0.025,
-                                 .poll_s = 0.005}),
-      driven_by<RobotiqGripper>({.model = "hande",
-                                 .stroke_mm = 50.0,
-                                 .step_mm = 50.0 / 227,
-                                 .deadband_mm = 0.23,
-                                 .speed_min_mm_s = 20.0,
-                                 .speed_max_mm_s = 150.0,
-                                 .force_min_N = 20.0,
-                                 .force_max_N = 185.0,
-                                 .latency_s = 0.025,
-                                 .poll_s = 0.005}),
-      driven_by<FeetechGripper>(feetech_traits("sts3215", Jaw(feetech_way({})), GripperWay().jaw_mm)),
+      robotiq_traits("2f85", 85.0, 0.4, {20.0, 150.0}, {20.0, 235.0}),
+      robotiq_traits("2f140", 140.0, 0.65, {30.0, 250.0}, {10.0, 125.0}),
+      robotiq_traits("hande", 50.0, 0.23, {20.0, 150.0}, {20.0, 185.0}),
+      {feetech_traits("sts3215", Jaw(feetech_way({})), GripperWay().jaw_mm), driven_by<FeetechGripper>},
   };
   return all;
 }
 
 const Model &model_of(const std::string &name) {
-  for (const Model &model : models()) {
-    if (model.traits.model == name) {
-      return model;
-    }
+  if (const Model *found = find_in(models(), [&](const Model &model) { return model.traits.model == name; })) {
+    return *found;
   }
   throw Error(ErrorCode::bad_value, "no gripper model " + printable(name) + "; there are " + gripper_model_names());
 }

@@ -3,6 +3,7 @@
 #include "grasp/gripper/common.hpp"
 #include "grasp/gripper/robotiq_registers.hpp"
 #include "libfingertip/clock.hpp"
+#include "libfingertip/text.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -392,12 +393,8 @@ std::string RobotiqGripper::fault_text(std::uint8_t fault) const {
       {ACTIVATION_FAULT, "activation failed, something was in its way; needs activation"},
       {OVERCURRENT, "too much current; needs activation"},
       {RELEASED, "automatic release is complete; needs activation"}};
-  for (const auto &[code, text] : TEXTS) {
-    if (code == fault) {
-      return text;
-    }
-  }
-  return "a fault that its manual does not have";
+  const auto *found = find_in(TEXTS, [&](const auto &one) { return one.first == fault; });
+  return found ? found->second : "a fault that its manual does not have";
 }
 
 } // namespace fingertip

@@ -1,5 +1,4 @@
 #include "grasp/gripper/feetech.hpp"
-#include "grasp/gripper/feetech_packet.hpp"
 #include "grasp/gripper/feetech_table.hpp"
 #include "models.hpp"
 
