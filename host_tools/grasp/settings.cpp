@@ -23,46 +23,34 @@ constexpr double GENTLE_mm_s = 4.0; // approach to what breaks
 
 } // namespace
 
+#define OF(member) [](S &s) -> double & { return s.member; }
+
 const std::vector<GraspSetting> &grasp_settings() {
   static const std::vector<GraspSetting> all = {
-      {FIXED, "N", 0.1, 100, 1, [](S &s) -> double & { return s.set_N; },
-       "Hold this force, not as much as the load needs"},
-      {"cap", "N", 0.5, 100, 1, [](S &s) -> double & { return s.cap_N; },
-       "The true force stays below, errors of the fingertips included"},
-      {"travel-cap", "mm", 0.5, 100, 1, [](S &s) -> double & { return s.travel_cap_mm; },
-       "Never close further since the touch"},
-      {"start", "N", 0.2, 100, 1, [](S &s) -> double & { return s.start_N; }, "Force before anything pulls"},
-      {"floor", "N", 0.2, 100, 1, [](S &s) -> double & { return s.floor_N; },
-       "Least force once the load is known; more where frames come late"},
-      {"blind", "N", 0.2, 100, 1, [](S &s) -> double & { return s.blind_N; }, "Force where no load can be estimated"},
-      {"friction", "", 0.1, 1.5, 1, [](S &s) -> double & { return s.friction; }, "Friction coefficient to begin with"},
-      {"margin", "", 1, 5, 1, [](S &s) -> double & { return s.margin; },
-       "Force divided by load / friction; more where frames come late"},
-      {"slid", "", 1, 3, 1, [](S &s) -> double & { return s.slid; }, "Factor on that once the object has slid"},
-      {"decay", "%/s", 0, 2000, 0.01, [](S &s) -> double & { return s.decay_1_s; },
-       "How fast an excess of force decays"},
-      {"rest", "s", 0, 60, 1, [](S &s) -> double & { return s.rest_s; }, "No decay for this time after a slide"},
-      {"pull", "N", 0.2, 20, 1, [](S &s) -> double & { return s.pull_N; },
-       "Hand over when each fingertip is pulled so hard"},
-      {"touch", "N", 0.02, 2, 1, [](S &s) -> double & { return s.touch_N; }, "Force at which a touch begins"},
-      {"approach", "mm/s", 0.5, 8, 1, [](S &s) -> double & { return s.approach_mm_s; },
-       "Speed until the touch; slower where frames come late"},
-      {"release", "mm/s", 0.5, 100, 1, [](S &s) -> double & { return s.release_mm_s; }, "Speed of opening"},
-      {"open-width", "mm", 0, 500, 1, [](S &s) -> double & { return s.release_width_mm; }, "How far to open"},
-      {"stale", "ms", 5, 1000, 1e-3, [](S &s) -> double & { return s.stale_s; },
-       "Ignore a fingertip without a new frame for this time"},
-      {"late", "ms", 5, 500, 1e-3, [](S &s) -> double & { return s.late_s; },
-       "Report frames that arrive older than this"},
-      {"silent", "ms", 20, 5000, 1e-3, [](S &s) -> double & { return s.silent_s; }, "Timeout of the gripper"},
-      {"differ", "%", 5, 100, 0.01, [](S &s) -> double & { return s.differ; },
-       "Warn if the fingertips' forces differ by more at rest"},
-      {"kp", "um/N", 0, 10000, 1e-3, [](S &s) -> double & { return s.gains.kp_mm_N; },
-       "With --fixed: the published controller's proportional gain"},
-      {"ki", "um/(N s)", 0, 100000, 1e-3, [](S &s) -> double & { return s.gains.ki_mm_Ns; },
-       "Its gain of the integral"},
-      {"kd", "um s/N", 0, 10000, 1e-3, [](S &s) -> double & { return s.gains.kd_mm_s_N; },
-       "Its gain of the derivative"},
-      {"control", "ms", 0.5, 1000, 1e-3, [](S &s) -> double & { return s.control_s; }, "Time between two of its steps"},
+      {FIXED, "N", 0.1, 100, 1, OF(set_N), "Hold this force, not as much as the load needs"},
+      {"cap", "N", 0.5, 100, 1, OF(cap_N), "The true force stays below, errors of the fingertips included"},
+      {"travel-cap", "mm", 0.5, 100, 1, OF(travel_cap_mm), "Never close further since the touch"},
+      {"start", "N", 0.2, 100, 1, OF(start_N), "Force before anything pulls"},
+      {"floor", "N", 0.2, 100, 1, OF(floor_N), "Least force once the load is known; more where frames come late"},
+      {"blind", "N", 0.2, 100, 1, OF(blind_N), "Force where no load can be estimated"},
+      {"friction", "", 0.1, 1.5, 1, OF(friction), "Friction coefficient to begin with"},
+      {"margin", "", 1, 5, 1, OF(margin), "Force divided by load / friction; more where frames come late"},
+      {"slid", "", 1, 3, 1, OF(slid), "Factor on that once the object has slid"},
+      {"decay", "%/s", 0, 2000, 0.01, OF(decay_1_s), "How fast an excess of force decays"},
+      {"rest", "s", 0, 60, 1, OF(rest_s), "No decay for this time after a slide"},
+      {"pull", "N", 0.2, 20, 1, OF(pull_N), "Hand over when each fingertip is pulled so hard"},
+      {"touch", "N", 0.02, 2, 1, OF(touch_N), "Force at which a touch begins"},
+      {"approach", "mm/s", 0.5, 8, 1, OF(approach_mm_s), "Speed until the touch; slower where frames come late"},
+      {"release", "mm/s", 0.5, 100, 1, OF(release_mm_s), "Speed of opening"},
+      {"open-width", "mm", 0, 500, 1, OF(release_width_mm), "How far to open"},
+      {"stale", "ms", 5, 1000, 1e-3, OF(stale_s), "Ignore a fingertip without a new frame for this time"},
+      {"late", "ms", 5, 500, 1e-3, OF(late_s), "Report frames that arrive older than this"},
+      {"silent", "ms", 20, 5000, 1e-3, OF(silent_s), "Timeout of the gripper"},
+      {"differ", "%", 5, 100, 0.01, OF(differ), "Warn if the fingertips' forces differ by more at rest"},
+      {"kp", "um/N", 0, 10000, 1e-3, OF(gains.kp_mm_N), "With --fixed: the published controller's proportional gain"},
+      {"ki", "um/(N s)", 0, 100000, 1e-3, OF(gains.ki_mm_Ns), "Its gain of the integral"},
+      {"kd", "um s/N", 0, 10000, 1e-3, OF(gains.kd_mm_s_N), "Its gain of the derivative"},
+      {"control", "ms", 0.5, 1000, 1e-3, OF(control_s), "Time between two of its steps"},
   };
   return all;
 }
@@ -83,10 +71,8 @@ std::map<std::string, double> breaking_values(double breaks_N) {
 }
 
 std::map<std::string, double> preset_values(const std::string &preset) {
-  for (const GraspPreset &one : grasp_presets()) {
-    if (preset == one.name) {
-      return breaking_values(one.breaks_N);
-    }
+  if (const GraspPreset *found = find_in(grasp_presets(), [&](const auto &one) { return preset == one.name; })) {
+    return breaking_values(found->breaks_N);
   }
   impossible("no preset " + printable(preset) + "; there are " +
              joined(grasp_presets(), ", ", [](const GraspPreset &one) { return one.name; }));

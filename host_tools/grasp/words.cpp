@@ -61,12 +61,8 @@ constexpr Trouble TROUBLES[] = {
 std::string state_name(std::uint8_t state) { return state < GRIP_STATES ? STATES[state].name : std::to_string(state); }
 
 std::optional<std::uint8_t> state_of_name(std::string_view name) {
-  for (std::uint8_t state = 0; state < GRIP_STATES; state++) {
-    if (name == STATES[state].name) {
-      return state;
-    }
-  }
-  return std::nullopt;
+  const State *found = find_in(STATES, [&](const State &state) { return name == state.name; });
+  return found ? std::optional(static_cast<std::uint8_t>(found - STATES)) : std::nullopt;
 }
 
 std::string state_text(std::uint8_t state) { return state < GRIP_STATES ? STATES[state].text : std::to_string(state); }
@@ -82,14 +78,11 @@ std::string trouble_names(std::uint32_t trouble) {
 std::optional<std::uint32_t> trouble_of_names(std::string_view names) {
   std::uint32_t trouble = 0;
   for (const std::string_view name : split(names, ' ')) {
-    std::uint32_t bit = 0;
-    for (const Trouble &each : TROUBLES) {
-      bit = name == each.name ? std::uint32_t{each.bit} : bit;
-    }
-    if (bit == 0 && !names.empty()) {
+    const Trouble *found = find_in(TROUBLES, [&](const Trouble &each) { return name == each.name; });
+    if (!found && !names.empty()) {
       return std::nullopt;
     }
-    trouble |= bit;
+    trouble |= found ? std::uint32_t{found->bit} : 0u;
   }
   return trouble;
 }

@@ -35,6 +35,16 @@ auto find_in(Range &range, const IsIt &is_it) -> decltype(&*std::begin(range)) {
   return nullptr;
 }
 
+/* What text_of makes of each. */
+template <typename Range, typename TextOf>
+std::vector<std::string> texts_of(const Range &range, const TextOf &text_of) {
+  std::vector<std::string> all;
+  for (const auto &each : range) {
+    all.push_back(text_of(each));
+  }
+  return all;
+}
+
 struct AsText {
   template <typename Text> std::string operator()(const Text &text) const { return std::string(text); }
 };

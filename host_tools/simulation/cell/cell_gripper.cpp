@@ -1,4 +1,5 @@
 // fingertip_cell_gripper: serves a simulated gripper on a port of its own, in real time.
+#include "libfingertip/text.hpp"
 #include "simulation/cell/gripper_server.hpp"
 #include "tool/advice.hpp"
 
@@ -45,10 +46,7 @@ int main(int argc, char **argv) {
   CLI::App app("Serves a simulated gripper with its own protocol; prints its port. Ctrl-C ends it.",
                "fingertip_cell_gripper");
   Options options;
-  std::vector<std::string> models;
-  for (const GripperTraits &traits : gripper_models()) {
-    models.push_back(traits.model);
-  }
+  const auto models = texts_of(gripper_models(), [](const GripperTraits &one) { return one.model; });
   app.add_option("--model", options.server.model, "Which one")->required()->check(CLI::IsMember(models));
   app.add_option("--slave", options.server.slave, "Its address on the line; else the usual")->check(CLI::Range(1, 253));
   app.add_option("--link", options.server.link, "A name for the port, as long as it is served")->type_name("PATH");

@@ -48,11 +48,10 @@ Planned planned(const std::string &text) {
     const auto amount =
         to_double(std::string_view(text).substr(colon + 1, at == std::string::npos ? at : at - colon - 1));
     const auto after_s = at == std::string::npos ? 0.0 : to_double(std::string_view(text).substr(at + 1));
-    for (const Known &one : KNOWN) {
-      if (name == name_of(one.kind) && amount && *amount >= one.low && *amount <= one.high && after_s &&
-          *after_s >= 0.0 && *after_s <= 1e6) {
-        return {one.kind, *amount, *after_s};
-      }
+    const Known *known = find_in(KNOWN, [&](const Known &one) { return name == name_of(one.kind); });
+    if (known && amount && *amount >= known->low && *amount <= known->high && after_s && *after_s >= 0.0 &&
+        *after_s <= 1e6) {
+      return {known->kind, *amount, *after_s};
     }
   }
   throw Error(ErrorCode::bad_value,
@@ -62,7 +61,7 @@ Planned planned(const std::string &text) {
 }
 
 bool is_disturbance(const std::string &name) {
-  return std::any_of(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return name == name_of(one.kind); });
+  return find_in(KNOWN, [&](const Known &one) { return name == name_of(one.kind); }) != nullptr;
 }
 
 World::World(const Options &options, const Face &face, GripperMotion &motion)

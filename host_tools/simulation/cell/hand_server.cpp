@@ -1,5 +1,6 @@
 #include "simulation/cell/hand_server.hpp"
 
+#include "libfingertip/descriptor_transport.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"
 
@@ -27,13 +28,11 @@ void put(int client, const std::string &line) {
 
 HandServer::HandServer(const Place &place, std::size_t fingertips, bool obeys)
     : fingertips_(fingertips), obeys_(obeys), path_(place.port("truth")), name_(place.port("hand")) {
-  sockaddr_un address = {};
-  address.sun_family = AF_UNIX;
-  if (path_.size() >= sizeof address.sun_path) {
+  sockaddr_un address;
+  if (!unix_address(path_, &address)) {
     throw Error(ErrorCode::cannot_write, path_ + ": the name is too long for a socket; choose "
                                                  "a shorter --ports");
   }
-  std::memcpy(address.sun_path, path_.data(), path_.size());
   unlink(path_.c_str()); // of a simulation that was killed: its place is ours
   unlink(name_.c_str());
   listening_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);

@@ -33,7 +33,7 @@ std::vector<FingerProcess> fingers_of(const LiftOptions &options, const Place &p
     FingerProcess finger = place.finger(i, 2 * options.seed + i);
     Random random(options.seed, GAINS, i);
     for (double &gain : finger.gain) {
-      gain = 1.0 + std::clamp(options.gain_spread * random.normal(), -0.5, 0.5);
+      gain = 1.0 + std::clamp(options.gain_spread.value_or(0.05) * random.normal(), -0.5, 0.5);
     }
     finger.calibrated_sd = options.gain_sd;
     fingers.push_back(finger);
@@ -270,9 +270,8 @@ private:
       return true;
     }
     if (verb == "line") {
-      const auto &faults = line_faults();
-      const auto known = std::find_if(faults.begin(), faults.end(), [&](const auto &one) { return what == one.first; });
-      if (known == faults.end()) {
+      const auto *known = find_in(line_faults(), [&](const auto &one) { return what == one.first; });
+      if (!known) {
         return false;
       }
       line_.fault = known->second;

@@ -11,13 +11,10 @@
 
 namespace fingertip::cell {
 
-struct LiftOptions {
-  std::string model = gripper_models().front().model, face = "sphere18", truth, cache;
+struct LiftOptions : SimulationOptions {
+  std::string model = gripper_models().front().model, face = "sphere18";
   World::Options world;
-  double opens_mm = 4.0, gain_spread = 0.05, gain_sd = 0.01, patience_s = 0.0;
-  std::optional<double> seconds;
-  std::uint64_t seed = 1;
-  bool overwrite = false;
+  double opens_mm = 4.0, gain_sd = 0.01, patience_s = 0.0;
 };
 
 // The first grasp of this kind at the options' seed (kinds.hpp), and how far the gripper is open then; gravity and the

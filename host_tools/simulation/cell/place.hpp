@@ -20,6 +20,14 @@ constexpr std::array<const char *, 2> SIDES = {"left", "right"};
 // Signals that end a simulation set it.
 extern volatile std::sig_atomic_t interrupted;
 
+// Of every simulation.
+struct SimulationOptions {
+  std::string truth, cache;
+  std::optional<double> seconds, gain_spread; // gain_spread: standard deviation; none: the simulation's usual one
+  std::uint64_t seed = 1;
+  bool overwrite = false;
+};
+
 // The ports' folder, for one simulation at a time.
 class Place {
 public:

@@ -118,7 +118,7 @@ std::vector<FingerProcess> fingers_of(const PressOptions &options, const Place &
     finger.parallel_bus = true;
     Random random(finger.seed, GAINS, 0);
     for (double &gain : finger.gain) {
-      gain = 1.0 + std::clamp(options.gain_spread * random.normal(), -0.5, 0.5);
+      gain = 1.0 + std::clamp(options.gain_spread.value_or(0.1) * random.normal(), -0.5, 0.5);
     }
     fingers.push_back(finger);
   }

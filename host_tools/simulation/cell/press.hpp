@@ -11,14 +11,10 @@
 
 namespace fingertip::cell {
 
-struct PressOptions {
+struct PressOptions : SimulationOptions {
   std::size_t fingertips = 1; // 1 or 2
   bool by_hand = false;
-  std::string cache, truth;
-  double weight_g = 300.0, gain_spread = 0.1;
-  std::optional<double> seconds;
-  std::uint64_t seed = 1;
-  bool overwrite = false;
+  double weight_g = 300.0;
 };
 
 constexpr const char *PRESS_FACE = "sphere15"; // a ball of 15 mm, as calibrate asks for

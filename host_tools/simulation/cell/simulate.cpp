@@ -3,6 +3,7 @@
 // starts this program, which is next to it (tool/cli/commands/simulate.cpp).
 #include "libfingertip/error.hpp"
 #include "libfingertip/output_file.hpp"
+#include "libfingertip/text.hpp"
 #include "library/pad/table_file.hpp"
 #include "simulation/cell/lift.hpp"
 #include "simulation/cell/press.hpp"
@@ -20,13 +21,11 @@ namespace fs = std::filesystem;
 
 namespace {
 
-struct Options {
-  std::string ports, cache, truth, kind;
+struct Options : SimulationOptions {
+  std::string ports, kind;
   PressOptions press;
   LiftOptions lift;
-  double gain_spread = 0.0, seconds = 0.0, pull_g = 0.0;
-  std::uint64_t seed = 1;
-  bool overwrite = false;
+  double pull_g = 0.0;
 };
 
 // Contact tables: those that were built with this program, for the faces that it needs by itself;
@@ -50,20 +49,9 @@ void run(const Options &options, bool is_lift, bool is_validate) {
     check_output(options.truth, options.overwrite);
   }
   const auto cache = [&](const std::string &face) { return options.cache.empty() ? tables_for(face) : options.cache; };
-  const auto both = [&](auto &one) {
-    one.truth = options.truth;
-    one.overwrite = options.overwrite;
-    one.seed = options.seed;
-    if (options.seconds > 0.0) {
-      one.seconds = options.seconds;
-    }
-    if (!std::isnan(options.gain_spread)) {
-      one.gain_spread = options.gain_spread;
-    }
-  };
   if (is_lift) {
     LiftOptions one = options.lift;
-    both(one);
+    static_cast<SimulationOptions &>(one) = options;
     one.cache = cache(one.face);
     if (!options.kind.empty()) {
       be_of_kind(one, kind_of(options.kind));
@@ -76,10 +64,10 @@ void run(const Options &options, bool is_lift, bool is_validate) {
     one.pulling.weight_g = options.pull_g;
     one.seed = options.seed;
     one.cache = cache(PRESS_FACE);
-    validate(one, options.seconds > 0.0 ? std::optional(options.seconds) : std::nullopt, Place(options.ports));
+    validate(one, options.seconds, Place(options.ports));
   } else {
     PressOptions one = options.press;
-    both(one);
+    static_cast<SimulationOptions &>(one) = options;
     one.cache = cache(PRESS_FACE);
     press(one, Place(options.ports));
   }
@@ -93,17 +81,14 @@ int main(int argc, char **argv) {
                "(sim: for the first). Ctrl-C ends it.",
                "fingertip simulate");
   speak_plainly(app);
+  const auto name_of_any = [](auto one) { return name_of(one); };
   Options options;
   KindOfGrasp &object = options.lift.world.grasp;
   object.down_rad = M_PI_2; // the fingertips' cables leave upwards
   double friction = object.pads[0].friction;
   std::string shape = name_of(object.shape);
-  std::vector<std::string> models, planned_texts;
-  for (const GripperTraits &traits : gripper_models()) {
-    models.push_back(traits.model);
-  }
+  std::vector<std::string> planned_texts;
   bool is_press = false, by_command = false;
-  options.gain_spread = std::nan("");
   double lift_after_s = *options.lift.world.lift_after_s;
   CLI::Option *press_flag =
       app.add_flag("--press", is_press,
@@ -168,26 +153,19 @@ int main(int argc, char **argv) {
     return of_lift.back();
   };
   of_lift.push_back(app.add_option("--gripper", options.lift.model, "Which one")
-                        ->check(CLI::IsMember(models))
+                        ->check(CLI::IsMember(texts_of(gripper_models(), [](const auto &one) { return one.model; })))
                         ->capture_default_str());
   of_lift.push_back(
       app.add_option("--face", options.lift.face,
                      "The indenter whose pressures a point of the object has, and a line or an area in a row")
           ->capture_default_str());
-  std::vector<std::string> kinds;
-  for (const Kind kind : KINDS) {
-    kinds.push_back(name_of(kind));
-  }
   CLI::Option *kind = app.add_option("--kind", options.kind,
                                      "A grasp of this kind, drawn by the seed: object, lift, and what happens then")
-                          ->check(CLI::IsMember(kinds));
+                          ->check(CLI::IsMember(texts_of(KINDS, name_of_any)));
   const std::size_t before_drawn = of_lift.size();
-  std::vector<std::string> shapes;
-  for (const Shape one : SHAPES) {
-    shapes.push_back(name_of(one));
-  }
-  of_lift.push_back(
-      app.add_option("--shape", shape, "Of the object")->check(CLI::IsMember(shapes))->capture_default_str());
+  of_lift.push_back(app.add_option("--shape", shape, "Of the object")
+                        ->check(CLI::IsMember(texts_of(SHAPES, name_of_any)))
+                        ->capture_default_str());
   lift_number("--width", object.width_mm, "MM", 1.0, 500.0, "Of the object, between the fingers");
   lift_number("--length", object.height_mm, "MM", 1.0, 500.0, "Of a cylinder, and the height of a box or plate");
   lift_number("--off-centre", object.com_mm.x, "MM", 0.0, 250.0, "Of its centre of mass, level");
