@@ -10,9 +10,7 @@
 #include "simulation/cell/kind_trial.hpp"
 
 #include <CLI/CLI.hpp>
-#include <chrono>
 #include <iostream>
-#include <memory>
 
 namespace fingertip::grasp {
 namespace {
@@ -57,8 +55,7 @@ std::map<std::string, double> settings_of(const std::string &changes) {
     const std::size_t equals = one.find('=');
     const std::string name(one.substr(0, equals));
     const auto value = equals == std::string_view::npos ? std::nullopt : to_double(one.substr(equals + 1));
-    const auto &all = grasp_settings();
-    if (std::none_of(all.begin(), all.end(), [&](const GraspSetting &each) { return name == each.name; })) {
+    if (!find_in(grasp_settings(), [&](const GraspSetting &each) { return name == each.name; })) {
       throw std::runtime_error("the controller has no setting \"" + name + "\"");
     }
     if (!value) {
@@ -127,43 +124,16 @@ struct Done {
   KindTrial trial;
   KindOutcome outcome;
   GripSettings settings;
-  double step_us; // of the controller, the mean
 };
 
-// Counts what a step takes.
-class Timed : public Controller {
-public:
-  explicit Timed(Controller &inner) : inner_(inner) {}
-  void take_touch(std::size_t finger, const GripTouch &touch) override { inner_.take_touch(finger, touch); }
-  void take_status(const GripperStatus &status) override { inner_.take_status(status); }
-  GripReport step(double now_s, GripCommand &command) override {
-    using Clock = std::chrono::steady_clock;
-    const auto began = Clock::now();
-    const GripReport report = inner_.step(now_s, command);
-    seconds_ += std::chrono::duration<double>(Clock::now() - began).count();
-    steps_++;
-    return report;
-  }
-  double mean_us() const { return steps_ > 0 ? 1e6 * seconds_ / steps_ : 0.0; }
-
-private:
-  Controller &inner_;
-  double seconds_ = 0.0, steps_ = 0.0;
-};
-
-Done run_one(const Options &options, std::uint64_t n, const std::function<void(const KindMoment &)> &trace = {}) {
-  Done done{trial_of(options, n), {}, {}, 0.0};
+Done run_one(const Options &options, std::uint64_t n, const KindTrace &trace = {}) {
+  Done done{trial_of(options, n), {}, {}};
   done.settings = settings_with(options, done.trial);
   const GripperTraits &traits = done.trial.gripper.traits;
-  std::unique_ptr<Controller> controller;
-  if (options.controller == "textbook") {
-    controller = std::make_unique<Textbook>(traits);
-  } else {
-    controller = std::make_unique<CoreController>(done.settings, traits);
-  }
-  Timed timed(*controller);
-  done.outcome = run_kind(done.trial, timed, trace);
-  done.step_us = timed.mean_us();
+  Textbook textbook(traits);
+  CoreController ours(done.settings, traits);
+  Controller &controller = options.controller == "textbook" ? static_cast<Controller &>(textbook) : ours;
+  done.outcome = run_kind(done.trial, controller, trace);
   return done;
 }
 
@@ -188,7 +158,7 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
                     {"peak_N", o.peak_N},
                     {"start_N", one.settings.start_N},
                     {"cap_N", one.settings.cap_N},
-                    {"step_us", one.step_us},
+                    {"step_us", o.step_us},
                     {"events", ordered_json::array()},
                     {"catches", ordered_json::array()}};
   for (const Event &event : grasp.events) {
@@ -218,14 +188,8 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
 // All that is known of one grasp, every 2 ms.
 ordered_json traced(const Options &options, std::uint64_t n) {
   ordered_json series;
-  const Done done = run_one(options, n, [&](const KindMoment &m) {
-    const std::pair<const char *, double> values[] = {
-        {"t_s", m.t_s},           {"lift_s", std::max(m.lift_s, -1.0)},
-        {"width_mm", m.width_mm}, {"force_N", 0.5 * (m.left_N + m.right_N)},
-        {"least_N", m.least_N},   {"load_N", m.load_N},
-        {"way_mm", m.way_mm},     {"slid_mm", m.slid_mm},
-        {"slips", m.slips},       {"sensed_N", m.report.force_N}};
-    for (const auto &[name, value] : values) {
+  const Done done = run_one(options, n, [&](const auto &moment) {
+    for (const auto &[name, value] : moment) {
       series[name].push_back(value);
     }
   });
@@ -274,9 +238,7 @@ int run(int argc, char **argv) {
                  "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
       ->check(CLI::PositiveNumber)
       ->type_name("S");
-  std::vector<std::string> wrong;
-  std::transform(std::begin(WRONG), std::end(WRONG), std::back_inserter(wrong),
-                 [](const Wrong &one) { return one.name; });
+  const auto wrong = texts_of(WRONG, [](const Wrong &one) { return one.name; });
   app.add_option("--wrong", options.wrong, "Instead of events: what one fingertip reports wrongly in a steady hold")
       ->check(CLI::IsMember(wrong));
   app.add_option("--seed", options.seed,

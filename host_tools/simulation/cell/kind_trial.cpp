@@ -1,5 +1,6 @@
 #include "simulation/cell/kind_trial.hpp"
 
+#include "libfingertip/clock.hpp"
 #include "libfingertip/random.hpp"
 #include "simulation/cell/cell.hpp"
 #include "simulation/cell/gripper_line.hpp"
@@ -112,43 +113,6 @@ private:
   double next_s_, known_s_ = 0.0;
 };
 
-// What is on its way to the controller: touches and the gripper's answers, each late by its own delay.
-class Arrivals {
-public:
-  void touch(double at_s, std::size_t finger, const GripTouch &touch) { known_.push_back({at_s, finger, touch, {}}); }
-  void status(double at_s, const GripperStatus &status) { known_.push_back({at_s, GRIPPER, {}, status}); }
-  // Hands over what has come, in the order in which it was sent. After each, after(finger, touch)
-  // or after(): the controller may step.
-  template <class AFTER_TOUCH, class AFTER_STATUS>
-  void deliver(double now_s, Controller &controller, AFTER_TOUCH after_touch, AFTER_STATUS after_status) {
-    for (auto known = known_.begin(); known != known_.end();) {
-      if (known->at_s > now_s) {
-        ++known;
-        continue;
-      }
-      const Known come = *known;
-      known = known_.erase(known);
-      if (come.from == GRIPPER) {
-        controller.take_status(come.status);
-        after_status();
-      } else {
-        controller.take_touch(come.from, come.touch);
-        after_touch(come.from, come.touch);
-      }
-    }
-  }
-
-private:
-  static constexpr std::size_t GRIPPER = 2; // instead of a fingertip
-  struct Known {
-    double at_s;
-    std::size_t from;
-    GripTouch touch;
-    GripperStatus status;
-  };
-  std::deque<Known> known_;
-};
-
 // A force that is to be held.
 class SetPoint {
 public:
@@ -189,7 +153,7 @@ private:
 
 class KindRun {
 public:
-  KindRun(const KindTrial &trial, Controller &controller, const std::function<void(const KindMoment &)> &trace)
+  KindRun(const KindTrial &trial, Controller &controller, const KindTrace &trace)
       : trial_(trial), grasp_(trial.grasp), controller_(controller), trace_(trace), cell_(grasp_),
         gripper_(slowed(trial), trial.activates ? trial.gripper.traits.stroke_mm : grasp_.width_mm + grasp_.opens_mm,
                  Random(trial.seed, LINE, 0)),
@@ -260,20 +224,26 @@ private:
       const auto touch = faults_.frame(i, tip.measure(cell_.force_N(i), cell_.load_N(i), cell_.way_mm()));
       const bool gone = static_cast<int>(i) == grasp_.gone && lift_s_ < NEVER_s && since_lift_s() >= grasp_.gone_s;
       if (!tip.is_lost(grasp_.lost_share) && !gone && touch) {
-        arrivals_.touch(tip.known_s(grasp_.jitter_s, trial_.later_s), i, *touch);
+        arrivals_.push_back({tip.known_s(grasp_.jitter_s, trial_.later_s), [this, i, touch = *touch] {
+                               controller_.take_touch(i, touch);
+                               sensed_N_[i] = touch.force_N;
+                             }});
       }
       tip.skip();
     }
   }
 
+  // In the order in which it was sent; after each the controller may step.
   void deliver() {
-    arrivals_.deliver(
-        t_s_, controller_,
-        [this](std::size_t finger, const GripTouch &touch) {
-          sensed_N_[finger] = touch.force_N;
-          step_controller();
-        },
-        [this] { step_controller(); });
+    for (auto arrival = arrivals_.begin(); arrival != arrivals_.end();) {
+      if (arrival->at_s > t_s_) {
+        ++arrival;
+        continue;
+      }
+      arrival->take();
+      arrival = arrivals_.erase(arrival);
+      step_controller();
+    }
   }
 
   void exchange() {
@@ -288,11 +258,14 @@ private:
       answer.status.host_us += std::llround(0.5e6 * line.late_s); // the exchange's middle
     }
     answer.status.fault = faults_.is(Fault::Kind::fault, t_s_) ? 9 : answer.status.fault;
-    arrivals_.status(answer.known_s, answer.status);
+    arrivals_.push_back({answer.known_s, [this, status = answer.status] { controller_.take_status(status); }});
   }
 
   void step_controller() {
+    const std::int64_t began_us = steady_now_us();
     report_ = controller_.step(t_s_, command_);
+    stepping_us_ += static_cast<double>(steady_now_us() - began_us);
+    steps_++;
     stepped_s_ = t_s_;
     faults_.watch(t_s_, report_.state);
     if (faults_.has_begun(t_s_)) {
@@ -391,13 +364,21 @@ private:
     }
     if (trace_) {
       const Vector one = cell_.load_N(0), other = cell_.load_N(1);
-      trace_({t_s_, since_s, width_mm(), cell_.force_N(0), cell_.force_N(1), since_s >= 0.0 ? least_N_ : 0.0,
-              0.5 * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y)), -cell_.way_mm().y, cell_.slid_mm(),
-              cell_.slips(), report_});
+      trace_({{"t_s", t_s_},
+              {"lift_s", std::max(since_s, -1.0)},
+              {"width_mm", width_mm()},
+              {"force_N", cell_.mean_N()},
+              {"least_N", since_s >= 0.0 ? least_N_ : 0.0},
+              {"load_N", 0.5 * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y))},
+              {"way_mm", -cell_.way_mm().y},
+              {"slid_mm", cell_.slid_mm()},
+              {"slips", cell_.slips()},
+              {"sensed_N", report_.force_N}});
     }
   }
 
   KindOutcome outcome() {
+    outcome_.step_us = stepping_us_ / std::max(steps_, 1.0);
     outcome_.slides = report_.slides;
     outcome_.friction =
         report_.friction / (0.5 * inputs().friction_share * (grasp_.pads[0].friction + grasp_.pads[1].friction));
@@ -419,11 +400,15 @@ private:
   const KindTrial &trial_;
   const KindOfGrasp &grasp_;
   Controller &controller_;
-  const std::function<void(const KindMoment &)> &trace_;
+  const KindTrace &trace_;
   Cell cell_;
   GripperLine gripper_;
   std::array<Tip, 2> tips_;
-  Arrivals arrivals_;
+  struct Arrival { // of a touch or of the gripper's answer at the controller
+    double at_s;
+    std::function<void()> take;
+  };
+  std::deque<Arrival> arrivals_;
   Faults faults_;
   SetPoint set_point_;
   GripCommand command_{};
@@ -436,13 +421,13 @@ private:
   double t_s_ = 0.0, stepped_s_ = 0.0, sample_s_ = 0.0, answered_s_ = 0.0, touched_s_ = NEVER_s;
   double held_s_ = NEVER_s, lift_s_ = NEVER_s, slick_s_ = NEVER_s, slick_share_ = 1.0;
   double least_N_ = 0.0, turned_mm_ = 0.0, began_mm_ = 0.0;
+  double stepping_us_ = 0.0, steps_ = 0.0;
   int reversals_ = 0, direction_ = 0;
 };
 
 } // namespace
 
-KindOutcome run_kind(const KindTrial &trial, Controller &controller,
-                     const std::function<void(const KindMoment &)> &trace) {
+KindOutcome run_kind(const KindTrial &trial, Controller &controller, const KindTrace &trace) {
   return KindRun(trial, controller, trace).go();
 }
 

@@ -5,7 +5,7 @@
 // motion.c decides from that whether it slides.
 //
 // The controller steps after every frame and every status of the gripper (gripper_line.hpp), and
-// every 10 ms. Deterministic: the same grasp, seed and controller give the same bits.
+// every 10 ms. Deterministic but for step_us: the same grasp, seed and controller give the same bits.
 #pragma once
 
 #include "simulation/cell/controller.hpp"
@@ -16,6 +16,7 @@
 
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace fingertip::cell {
@@ -71,16 +72,13 @@ struct KindOutcome {
   double rms = 0.0;               // of the error from there on, share of the set force
   int reversals = 0;              // of the commanded width over the last half of the time
   Failed failed;
+  double step_us = 0.0; // real time of a step of the controller, the mean
 };
 
-struct KindMoment {
-  double t_s, lift_s, width_mm, left_N, right_N, least_N, load_N, way_mm, slid_mm; // lift_s: below 0 before it
-  bool slips;
-  GripReport report;
-};
+// What is true at a time, by name; lift_s: since the lift began, -1 before it.
+using KindTrace = std::function<void(const std::vector<std::pair<const char *, double>> &moment)>;
 
 // trace: called every 2 ms.
-KindOutcome run_kind(const KindTrial &trial, Controller &controller,
-                     const std::function<void(const KindMoment &)> &trace = {});
+KindOutcome run_kind(const KindTrial &trial, Controller &controller, const KindTrace &trace = {});
 
 } // namespace fingertip::cell

@@ -74,42 +74,22 @@ double acceleration_of(double t) { return t <= 0.0 || t >= 1.0 ? 0.0 : 60.0 * t 
 
 double draw(Random &random, const Range &range) { return random.uniform(range.low, range.high); }
 
+struct Drawn {
+  Range amount, seconds;
+};
+constexpr Drawn DRAWN_EVENTS[] = {{{0.03, 0.12}, {0.01, 0.03}}, {{0.3, 1.5}, {0.3, 1.0}}, {{1.0, 5.0}, {0.5, 1.5}},
+                                  {{0.3, 1.5}, {0.5, 2.0}},     {{1.0, 4.0}, {0.4, 1.2}}, {{0.2, 0.5}, {0.05, 0.4}}};
+
 Event draw_event(Random &random, std::size_t of, double begin_s, bool calm) {
   Event event{};
   event.begin_s = begin_s;
   event.angle_rad = random.uniform(-M_PI, M_PI);
   event.kind =
       calm ? (random.next() % 2 ? Event::Kind::carry : Event::Kind::push) : static_cast<Event::Kind>(random.next() % 6);
-  const double strength = ALL.strength[of];
-  switch (event.kind) {
-  case Event::Kind::knock:
-    event.amount = strength * random.uniform(0.03, 0.12);
-    event.seconds = random.uniform(0.01, 0.03);
-    break;
-  case Event::Kind::push:
-    event.amount = strength * random.uniform(0.3, 1.5);
-    event.seconds = random.uniform(0.3, 1.0);
-    break;
-  case Event::Kind::vibrate:
-    event.amount = strength * random.uniform(1.0, 5.0);
-    event.seconds = random.uniform(0.5, 1.5);
-    event.rate_Hz = random.uniform(4.0, 20.0);
-    break;
-  case Event::Kind::pour:
-    event.amount = strength * random.uniform(0.3, 1.5);
-    event.seconds = random.uniform(0.5, 2.0);
-    break;
-  case Event::Kind::carry:
-    event.amount = strength * random.uniform(1.0, 4.0);
-    event.seconds = random.uniform(0.4, 1.2);
-    break;
-  case Event::Kind::slick:
-    event.amount = strength * random.uniform(0.2, 0.5);
-    event.seconds = random.uniform(0.05, 0.4);
-    break;
-  case Event::Kind::jerk:
-    break;
-  }
+  const Drawn &drawn = DRAWN_EVENTS[static_cast<std::size_t>(event.kind)];
+  event.amount = ALL.strength[of] * draw(random, drawn.amount);
+  event.seconds = draw(random, drawn.seconds);
+  event.rate_Hz = event.kind == Event::Kind::vibrate ? random.uniform(4.0, 20.0) : 0.0;
   return event;
 }
 
