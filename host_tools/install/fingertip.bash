@@ -9,6 +9,7 @@ _fingertip() {
       --transport) words='auto socket serial usb' ;;
       --gripper|--model) words=$(fingertip gripper list 2> /dev/null | sed -n '2,/^$/p' | cut -f 1) ;;
       --colour) words='auto truecolour 256 plain' ;;
+      --unit) words='Pa hPa kPa mbar bar psi mmHg' ;;
       gripper) [ "$COMP_CWORD" -eq 2 ] && words='list info move open close' ;;
     esac
     if [ -z "$words" ] && [ "${current#-}" != "$current" ]; then

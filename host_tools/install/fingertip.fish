@@ -7,6 +7,7 @@ for side in left right
 end
 complete -c fingertip -n 'not __fish_use_subcommand' -l gripper -x -a "(fingertip gripper list 2> /dev/null | sed -n '2,/^\$/p' | cut -f 1)"
 complete -c fingertip -n 'not __fish_use_subcommand' -l transport -x -a 'auto socket serial usb'
+complete -c fingertip -n 'not __fish_use_subcommand' -l unit -x -a 'Pa hPa kPa mbar bar psi mmHg'
 complete -c fingertip -n '__fish_seen_subcommand_from gripper' -f -a 'list info move open close'
 complete -c fingertip -n '__fish_seen_subcommand_from gripper' -l model -x -a "(fingertip gripper list 2> /dev/null | sed -n '2,/^\$/p' | cut -f 1)"
 complete -c fingertip -n 'not __fish_use_subcommand' -n 'string match -q -- "-*" (commandline -ct)' \

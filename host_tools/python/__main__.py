@@ -1,6 +1,6 @@
 """The package's commands, out of the source tree.
 
-    /usr/bin/python3 host_tools/python plot|scenario|evaluate|validate|ros2|bridge|recorder ...
+    /usr/bin/python3 host_tools/python plot|scenario|evaluate|fit|validate|ros2|bridge|recorder ...
 
 what pip installs as fingertip-plot, fingertip-scenario and so on; --help after a command has its options.
 """
@@ -9,7 +9,7 @@ import importlib
 import os
 import sys
 
-COMMANDS = ("plot", "scenario", "evaluate", "validate", "ros2", "bridge", "recorder")
+COMMANDS = ("plot", "scenario", "evaluate", "fit", "validate", "ros2", "bridge", "recorder")
 SYSTEM = "/usr/bin/python3"  # has what the system's packages install
 
 

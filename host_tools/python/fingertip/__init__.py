@@ -33,6 +33,7 @@ from .errors import (
     SeveralFingertipsError as SeveralFingertipsError,
     UnknownCommandError as UnknownCommandError,
 )
+from .fit import calibrate as calibrate, fit as fit, read_pad as read_pad
 from .files import Recording as Recording, read_recording as read_recording
 from .frames import Block as Block, Edge as Edge, Frame as Frame
 from .group import Fingertips as Fingertips

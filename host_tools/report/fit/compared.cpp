@@ -3,9 +3,9 @@
 
 #include "common/contact_flags.h"
 #include "libfingertip/in_parallel.hpp"
-#include "report/measure/entry.hpp"
-#include "report/measure/stopwatch.hpp"
 #include "report/reference/reference.hpp"
+#include "tool/arrays/entry.hpp"
+#include "tool/arrays/stopwatch.hpp"
 
 extern "C" {
 #include "alternatives/alternatives.h"

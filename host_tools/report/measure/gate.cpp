@@ -1,6 +1,6 @@
 // The firmware's zero and gate over many frames: of a simulated pad for hours, and of series that are given.
 #include "libfingertip/random.hpp"
-#include "report/measure/entry.hpp"
+#include "tool/arrays/entry.hpp"
 
 extern "C" {
 #include "condition/condition.h"

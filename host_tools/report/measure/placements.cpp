@@ -1,9 +1,9 @@
 // Pads of the twin on which a person calibrates and taps (sessions.hpp), many at once.
 #include "libfingertip/in_parallel.hpp"
-#include "report/measure/calibrations.hpp"
-#include "report/measure/entry.hpp"
 #include "report/measure/sessions.hpp"
 #include "report/measure/tables.hpp"
+#include "tool/arrays/calibrations.hpp"
+#include "tool/arrays/entry.hpp"
 
 #include <algorithm>
 #include <functional>

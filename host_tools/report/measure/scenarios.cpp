@@ -4,8 +4,8 @@
 #include "libfingertip/in_parallel.hpp"
 #include "library/pad/edges.hpp"
 #include "library/pad/profile.hpp"
-#include "report/measure/entry.hpp"
 #include "report/measure/tables.hpp"
+#include "tool/arrays/entry.hpp"
 
 #include <algorithm>
 #include <cstring>

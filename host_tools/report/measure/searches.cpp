@@ -1,5 +1,5 @@
 // Presses that are repeated: what they show of the sensors' gains.
-#include "report/measure/fit_arguments.hpp"
+#include "tool/arrays/fit_arguments.hpp"
 
 extern "C" {
 #include "fit/fit_gains.h"

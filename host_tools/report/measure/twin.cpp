@@ -2,10 +2,10 @@
 #include "libfingertip/in_parallel.hpp"
 #include "libfingertip/random.hpp"
 #include "library/pad/profile.hpp"
-#include "report/measure/entry.hpp"
 #include "report/measure/tables.hpp"
 #include "simulation/twin/effects.hpp"
 #include "simulation/twin/trajectory.hpp"
+#include "tool/arrays/entry.hpp"
 
 extern "C" {
 #include "common/pad_profile.h"
@@ -73,13 +73,6 @@ static void random_below(Batch<Random, 1> states, std::int64_t end, Batch<std::i
   }
 }
 MEASURE_ENTRY(random_below)
-
-// The profile of a pad over the firmware's own sensors; overhang 0: not set.
-static void profile_of(double thickness_mm, double overhang_mm, std::int64_t from_touch,
-                       Batch<pad_profile, 1> profile) {
-  profile[0] = pad::profile_over_own_sensors({thickness_mm, overhang_mm, from_touch != 0});
-}
-MEASURE_ENTRY(profile_of)
 
 // A contact shape by its measures. The twin's own have names: shape_named.
 struct contact_shape {

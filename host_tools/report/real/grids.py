@@ -7,10 +7,11 @@ shift. Every second row of presses aligns the layout and gives placements for ca
 import csv
 import dataclasses
 
+import fingertip
 import numpy as np
 from fingertip.files import InputError
+from fingertip.fit import inputs, read_pad, response_of
 from fingertip.line import WARNINGS, Flag
-from measure import q10, round_half_away, usable_of
 
 PA_PER_PSI = 6894.757
 NOISE_PA = 10.0  # of a mean of ten samples, whose steps are 20 Pa
@@ -104,7 +105,7 @@ class Fingertip:
 
     def __init__(self, measure, layout, pitch_mm):
         self.measure, self.layout_mm, self.pitch_mm = measure, tuple(np.ascontiguousarray(layout.T)), pitch_mm
-        self.array = measure.array(*self.layout_mm, pitch_mm)
+        self.pad = {"pitch_mm": pitch_mm, "places_mm": layout.tolist()}
 
     def calibrate(self, reading_Pa, every_s=EVERY_S, last=True):
         """A Calibration for each session of placements [session, placement, sensor]. last: no placement follows."""
@@ -125,25 +126,17 @@ class Fingertip:
                 found[i] = one if one.found["state"] else None
         return found
 
-    def inputs(self, reading_Pa, calibration=None, prior=(0.0, 0.0), **fields):
-        """What the fit gets of readings [press, sensor], NaN where a sensor is missing: settings, readings in 1/1024 Pa, bitmap of usable sensors, own."""
-        settings = self.measure.settings(noise_Pa=NOISE_PA, prior_sigma_mm=prior[0], prior_width_mm=prior[1], **fields)
-        gain, own = 1.0, None
-        if calibration:
-            gain, own = calibration.sensors["gain"], calibration.own[None] if calibration.found["has_own"] else None
-            settings["gain_sd_q16"][0, : len(gain)] = round_half_away(65536 * calibration.sensors["reading_sd"])
-            for name in ("prior_sigma_mm", "prior_width_mm", "dip_share", "dip_sd_mm"):
-                settings[name] = calibration.found[name]
-        return settings, q10(reading_Pa / gain), usable_of(reading_Pa), own
+    def fit(self, reading_Pa, response=None):
+        """What `fingertip fit` finds of readings [press, sensor], NaN where a sensor is missing, as of presses that are held."""
+        return fingertip.fit(reading_Pa, self.pad, calibration=response, noise_Pa=NOISE_PA)
 
-    def fit(self, *arguments, **named):
-        """fit_result [press] of the inputs of these arguments, as of presses that are held."""
-        settings, readings, usable, own = self.inputs(*arguments, **named)
-        return self.measure.fit_held(self.array, settings, readings, usable, own=own)
+    def inputs(self, reading_Pa, response=None, **fields):
+        """What the fit gets of these: fit_array, settings, readings, bitmap of usable sensors, own."""
+        return inputs(self.measure, read_pad(self.pad), reading_Pa, response, NOISE_PA, **fields)
 
     def us(self, several):
         """Microseconds of one fit of each of several inputs, in the quickest of PASSES passes in which they take turns."""
-        return np.min([[self.measure.timed_fit(self.array, *one[:3], own=one[3])[1] for one in several] for _ in range(PASSES)], axis=0)
+        return np.min([[self.measure.timed_fit(*one[:4], own=one[4])[1] for one in several] for _ in range(PASSES)], axis=0)
 
 
 @dataclasses.dataclass
@@ -157,6 +150,10 @@ class Calibration:
     @property
     def good(self):
         return bool(self.found["state"] == 1)
+
+    @property
+    def response(self):
+        return response_of(self.found, self.sensors)
 
 
 def dip_share(grid):
@@ -172,12 +169,12 @@ class Errors:
     """Fits beside where the presses were. All arrays [press]; without a fit the error is infinite."""
 
     def __init__(self, fits, xy):
-        valid = fits["flags"] & np.uint32(Flag.FIT_VALID) != 0
-        apart = np.hypot(fits["x_mm"].astype(float) - xy[:, 0], fits["y_mm"].astype(float) - xy[:, 1])
+        valid = fits["flags"] & Flag.FIT_VALID != 0
+        apart = np.hypot(fits["x_mm"] - xy[:, 0], fits["y_mm"] - xy[:, 1])
         self.error_mm = np.where(valid, apart, np.inf)
-        self.sd_mm = fits["location_sd_mm"].astype(float)
-        self.warned = ~valid | (fits["flags"] & np.uint32(WARNINGS) != 0)
-        self.force_N = np.where(valid, fits["force_N"].astype(float), np.nan)
+        self.sd_mm = np.nan_to_num(fits["location_sd_mm"])
+        self.warned = ~valid | (fits["flags"] & WARNINGS != 0)
+        self.force_N = fits["force_N"]
 
     @classmethod
     def joined(cls, several):

@@ -19,11 +19,12 @@ def rows(presses, measured):
     """measured: for each pad (fingertip, readings [press, sensor], xy_mm [press, 2], calibration)."""
     error_mm, run_time = {}, {}
     for fingertip, readings, xy_mm, calibration in measured:
-        ways = {"published": {"cut_noises": 0}, "shipped": {}, "calibrated": {"calibration": calibration}}
+        ways = {"published": {"cut_noises": 0}, "shipped": {}, "calibrated": {"response": calibration.response}}
         keys = [(way, iterations) for way in ways for iterations in ITERATIONS]
         us = dict(zip(keys, fingertip.us([fingertip.inputs(readings, iterations=iterations, **ways[way]) for way, iterations in keys])))
         for way, iterations in keys:
-            fits = fingertip.fit(readings, iterations=iterations, **ways[way])
+            *of, own = fingertip.inputs(readings, iterations=iterations, **ways[way])
+            fits = fingertip.measure.fit_held(*of, own=own)
             error_mm.setdefault((way, iterations), []).append(grids.Errors(fits, xy_mm).error_mm)
             run_time.setdefault((way, iterations), []).append(us[way, iterations] / us["published", PUBLISHED_ITERATIONS])
     return [

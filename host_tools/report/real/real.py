@@ -17,6 +17,7 @@ calibrations, the others are judged.
 
 import hashlib
 import json
+import os
 import pathlib
 import sys
 
@@ -86,22 +87,22 @@ def judge_grid(measure, one, path):
     fingertip = grids.Fingertip(measure, grid.layout, grid.pitch_mm)
     readings, xy = grid.reading_Pa[grid.judged], grid.xy[grid.judged]
     inside, outside = grid.inside[grid.judged], grid.outside[grid.judged]
-    set_by_hand = (float(np.median(grid.width_mm)), grids.PRIOR_WIDTH_MM)
+    set_by_hand = {"sigma_mm": float(np.median(grid.width_mm)), "sigma_sd_mm": grids.PRIOR_WIDTH_MM}
     sessions = np.array(grid.sessions(SEED))
     calibrations = fingertip.calibrate(grid.reading_Pa[sessions])
     in_rows = fingertip.calibrate(grid.reading_Pa[np.sort(sessions)])  # as the gantry went
     solved = [one for one in calibrations if one.found["solved"]]
     torn, torn_xy = one_missing(readings[inside]), np.repeat(xy[inside], readings.shape[1], axis=0)
-    calibrated = [grids.Errors(fingertip.fit(readings, one), xy) for one in solved]
-    missing = [grids.Errors(fingertip.fit(torn, one), torn_xy) for one in solved]
-    shipped, raw = (grids.Errors(fingertip.fit(readings, **more), xy) for more in ({}, {"prior": set_by_hand}))
+    calibrated = [grids.Errors(fingertip.fit(readings, one.response), xy) for one in solved]
+    missing = [grids.Errors(fingertip.fit(torn, one.response), torn_xy) for one in solved]
+    shipped, raw = (grids.Errors(fingertip.fit(readings, known), xy) for known in (None, set_by_hand))
     accepted = [one for one in calibrations if one.good]
     guided = fingertip.guided(grid, SEED)
     all_inside, all_outside = np.tile(inside, len(calibrated)), np.tile(outside, len(calibrated))
     worse = np.zeros(3, int)  # sessions whose median, 95th percentile, silent presses are more than those of the pad as shipped
     after = {}
     for way, several in (("random", calibrations), ("rows", in_rows), ("guided", guided)):
-        errors = [grids.Errors(fingertip.fit(readings, one), xy) for one in several if one.good]
+        errors = [grids.Errors(fingertip.fit(readings, one.response), xy) for one in several if one.good]
         for each in errors:
             worse += [each.figures(inside, outside)[name] > shipped.figures(inside, outside)[name] for name in COMPARED]
         after[way] = [
@@ -111,7 +112,7 @@ def judge_grid(measure, one, path):
     found = {
         "recording": one["key"],
         "part": one["part"],
-        "width_mm": set_by_hand[0],
+        "width_mm": set_by_hand["sigma_mm"],
         "dip_percent": 100 * grids.dip_share(grid),
         "gains_cv_percent": 100 * float(grid.peak_Pa.std() / grid.peak_Pa.mean()),
         "places_off_mm": float(np.median(grid.places_off_mm)),
@@ -220,6 +221,7 @@ def main(argv):
     options = parser.parse_args(argv)
     output_folder(options)
     firmware = Measure(options.build)
+    os.environ["FINGERTIP_TOOL"] = str(firmware.build / "host_tools/tool/cli/fingertip")
     sources = json.loads(pathlib.Path(options.sources).read_text(encoding="utf-8"))
     here = found_below(options.folder, sources)
     found, shown = judge_grids(firmware, sources["grids"], here)

@@ -77,6 +77,7 @@ void add_web(CommandLine &line);
 void add_tare(CommandLine &line);
 void add_calibrate(CommandLine &line);
 void add_validate(CommandLine &line);
+void add_fit(CommandLine &line);
 void add_pad(CommandLine &line);
 void add_set(CommandLine &line);
 void add_loader(CommandLine &line);

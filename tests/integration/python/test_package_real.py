@@ -116,7 +116,7 @@ class Examples(DeviceTest):
         return re.findall(rf"```{language}\n(.*?)```", (ROOT / path).read_text(encoding="utf-8"), re.S)
 
     def test_package_readme(self):
-        os.environ["FINGERTIP_PORT"] = self.port
+        os.environ |= {"FINGERTIP_PORT": self.port, "FINGERTIP_TOOL": FINGERTIP}
         examples = [code for code in self.blocks("host_tools/python/README.md") if "import zenoh" not in code]  # test_zenoh.py runs that
         self.assertGreater(len(examples), 3)
         for code in examples:

@@ -463,7 +463,7 @@ class Command(ValidateTest):
 
     def test_without_the_solver_it_states_what_to_install(self):
         with mock.patch.dict(os.environ, {"FINGERTIP_TOOL": "", "PATH": ""}):
-            with self.assertRaisesRegex(assess.InputError, "the command fingertip solves the gains, and is not installed"):
+            with self.assertRaisesRegex(assess.InputError, "the command fingertip computes this, and is not installed"):
                 assess.solve_gains(ARRAY, [], 3.0)
 
 

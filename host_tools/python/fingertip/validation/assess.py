@@ -9,9 +9,7 @@ Cautions are less than findings: figures far outside of those of healthy simulat
 
 import json
 import math
-import os
 import pathlib
-import shutil
 import statistics
 import subprocess
 from typing import NamedTuple
@@ -19,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
+from ..fit import tool
 from ..line import Capability, Stored
 from .marks_fit import LOOSE_SCATTER, MARKS_MIN, RESPONDS_SHARE, fit_marks
 from .measure import AFTER_s
@@ -87,18 +86,15 @@ def _named(sensors):
 
 def solve_gains(array, placements, force_N):
     """What `fingertip calibrate` finds of these placements: there is one solver of a calibration. Raises InputError."""
-    tool = os.environ.get("FINGERTIP_TOOL") or shutil.which("fingertip")
-    if not tool:
-        raise InputError("the command fingertip solves the gains, and is not installed; install it, or name it in FINGERTIP_TOOL")
     asked = {"x_mm": list(array.x_mm), "y_mm": list(array.y_mm), "pitch_mm": array.pitch_mm, "force_N": force_N}
     own = (
         {"usable": np.flatnonzero(one.usable).tolist(), "reading_Pa": list(one.reading_Pa), "rest_Pa": list(one.rest_Pa)}
         for one in placements
     )
     asked["placements"] = [one._asdict() | lists for one, lists in zip(placements, own)]
-    done = subprocess.run([tool, "calibrate", "--placements"], input=json.dumps(asked), capture_output=True, text=True, check=False)
+    done = subprocess.run([tool(), "calibrate", "--placements"], input=json.dumps(asked), capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        raise InputError(done.stderr.strip().removeprefix("fingertip: ") or f"{tool}: failed; see that it is of this version")
+        raise InputError(done.stderr.strip().removeprefix("fingertip: ") or f"{tool()}: failed; see that it is of this version")
     return json.loads(done.stdout)
 
 

@@ -22,17 +22,19 @@ int simulate(Words options) {
   become(program->string(), options);
 }
 
-/* The evaluator of a pad is in the Python package, which asks this program for the gains. */
-int validate(Words options) {
+/* A command of the Python package, which asks this program for the gains and finds by it what else is installed. */
+int run_in_package(const std::string &name, Words options) {
   const auto package = find_installed({"../share/fingertip/python", "python"});
   if (!package) {
-    throw Error("the package that validates is not installed; install all of the tool, or build the target fingertip "
-                "in the project's tree");
+    throw Error("the Python package is not installed; install all of the tool, or build the target fingertip in the "
+                "project's tree");
   }
   setenv("FINGERTIP_TOOL", this_program().c_str(), 0);
-  options.insert(options.begin(), {package->string(), "validate"});
-  become("python3", options, "validate needs Python: sudo apt install python3 python3-numpy python3-serial");
+  options.insert(options.begin(), {package->string(), name});
+  become("python3", options, name + " needs Python: sudo apt install python3 python3-numpy python3-serial");
 }
+int validate(Words options) { return run_in_package("validate", std::move(options)); }
+int fit(Words options) { return run_in_package("fit", std::move(options)); }
 
 void add_program(CommandLine &line, const std::string &name, const std::string &help, int (*run)(Words)) {
   auto command = std::make_shared<CLI::App *>();
@@ -46,6 +48,10 @@ void add_program(CommandLine &line, const std::string &name, const std::string &
 void add_simulate(CommandLine &line) {
   add_program(line, "simulate", "Simulate fingertips, which every program finds as it finds real ones, until Ctrl-C",
               simulate);
+}
+
+void add_fit(CommandLine &line) {
+  add_program(line, "fit", "Fit pressures of any array that are in a file, by the firmware's own code", fit);
 }
 
 void add_validate(CommandLine &line) {

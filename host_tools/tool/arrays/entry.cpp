@@ -1,4 +1,4 @@
-#include "report/measure/entry.hpp"
+#include "tool/arrays/entry.hpp"
 
 #include <cstdio>
 #include <cstdlib>

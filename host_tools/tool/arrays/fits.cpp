@@ -1,7 +1,7 @@
 // The firmware's fit on many presses, of any layout.
 #include "libfingertip/in_parallel.hpp"
-#include "report/measure/fit_arguments.hpp"
-#include "report/measure/stopwatch.hpp"
+#include "tool/arrays/fit_arguments.hpp"
+#include "tool/arrays/stopwatch.hpp"
 
 extern "C" {
 #include "config/defaults.h"

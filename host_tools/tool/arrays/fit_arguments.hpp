@@ -3,7 +3,7 @@
 // settings: [1 or press]. own: of each sensor, [1 or press][sensor], or none at all, [0][sensor].
 #pragma once
 
-#include "report/measure/entry.hpp"
+#include "tool/arrays/entry.hpp"
 
 extern "C" {
 #include "fit/fit.h"

@@ -1,8 +1,8 @@
 // The tool's calibration, on many sessions.
-#include "report/measure/calibrations.hpp"
+#include "tool/arrays/calibrations.hpp"
 
 #include "libfingertip/in_parallel.hpp"
-#include "report/measure/entry.hpp"
+#include "tool/arrays/entry.hpp"
 
 extern "C" {
 #include "fit/fit.h"

@@ -1,7 +1,7 @@
 // What the firmware publishes of contacts over frames: the tangential force, shapes of contacts that are held, and
 // motion.
 #include "libfingertip/in_parallel.hpp"
-#include "report/measure/fit_arguments.hpp"
+#include "tool/arrays/fit_arguments.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
@@ -81,6 +81,21 @@ static void publish(Batch<const pad_profile, 1> profile, Batch<const double, 1> 
   }
 }
 MEASURE_ENTRY(publish)
+
+// The force that the firmware reports of fits whose largest readings are these, and its standard deviation.
+static void weigh(double force_scale, double force_scale_sd, Batch<const fit_result, 1> fits,
+                  Batch<const double, 1> largest_Pa, Batch<double, 2> found) {
+  same_length(found, fits, largest_Pa);
+  contact_settings scales{};
+  scales.force_scale = static_cast<float>(force_scale);
+  scales.force_scale_sd = static_cast<float>(force_scale_sd);
+  for (std::size_t i = 0; i < found.size(); i++) {
+    const contact_force force = contact_weigh(&scales, &fits[i], static_cast<float>(largest_Pa[i]));
+    found.row(i)[0] = static_cast<double>(force.force_N);
+    found.row(i)[1] = static_cast<double>(force.force_sd_N);
+  }
+}
+MEASURE_ENTRY(weigh)
 
 MEASURE_RECORD(shapes_place, FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm))
 

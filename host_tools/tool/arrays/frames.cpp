@@ -1,7 +1,8 @@
 // What follows the fit, on frames in order: condition, contact with slip, tangential estimate and shapes. Runs and
 // contacts are independent of each other; along the dimension `frame` their state goes on.
 #include "libfingertip/in_parallel.hpp"
-#include "report/measure/fit_arguments.hpp"
+#include "library/pad/profile.hpp"
+#include "tool/arrays/fit_arguments.hpp"
 
 extern "C" {
 #include "common/pad_profile.h"
@@ -13,6 +14,7 @@ extern "C" {
 #include "ms58xx/ms58xx.h"
 }
 
+#include <algorithm>
 #include <memory>
 
 using namespace fingertip::measure;
@@ -32,11 +34,13 @@ MEASURE_RECORD(contact_result, FIELD(flags), FIELD(slip_mm))
 struct firmware_constants {
   double sensor_max_pressure_Pa, default_gain_sd, default_model_sd, location_sd_limit_mm;
   std::int32_t zero_tare_frames, default_fit_iterations;
-  std::int32_t tangential_frames, shapes_frames; // until the first answer
+  std::int32_t tangential_frames, shapes_frames;                           // until the first answer
+  double gate_open_Pa, gate_open_noises, gate_close_Pa, gate_close_noises; // of the largest reading
 };
 MEASURE_RECORD(firmware_constants, FIELD(sensor_max_pressure_Pa), FIELD(default_gain_sd), FIELD(default_model_sd),
                FIELD(location_sd_limit_mm), FIELD(zero_tare_frames), FIELD(default_fit_iterations),
-               FIELD(tangential_frames), FIELD(shapes_frames))
+               FIELD(tangential_frames), FIELD(shapes_frames), FIELD(gate_open_Pa), FIELD(gate_open_noises),
+               FIELD(gate_close_Pa), FIELD(gate_close_noises))
 
 static void constants_of_build(Batch<firmware_constants, 1> constants) {
   constants[0] = {static_cast<double>(MS58XX_MAX_PRESSURE_Pa),
@@ -46,7 +50,11 @@ static void constants_of_build(Batch<firmware_constants, 1> constants) {
                   ZERO_TARE_FRAMES,
                   DEFAULT_FIT_ITERATIONS,
                   FIT_TANGENTIAL_FRAMES,
-                  FIT_SHAPES_FRAMES};
+                  FIT_SHAPES_FRAMES,
+                  GATE_OPEN_Pa,
+                  GATE_OPEN_SIGMA,
+                  GATE_CLOSE_Pa,
+                  GATE_CLOSE_SIGMA};
 }
 MEASURE_ENTRY(constants_of_build)
 
@@ -116,6 +124,20 @@ MEASURE_RECORD(fit_shapes_pad)
 MEASURE_RECORD(fit_shapes_result, FIELD(shape), FIELD(x_mm), FIELD(y_mm), FIELD(force_N), FIELD(location_sd_mm),
                FIELD(force_sd_N), FIELD(length_mm), FIELD(along_x), FIELD(along_y), FIELD(angle_sd_rad), FIELD(qx_N),
                FIELD(qy_N), FIELD(chi_square))
+
+// Of a pad over these sensors; overhang 0: not set.
+static void profile_of(Batch<const float, 1> x_mm, Batch<const float, 1> y_mm, double pitch_mm, double thickness_mm,
+                       double overhang_mm, Batch<pad_profile, 1> profile) {
+  same_length(x_mm, y_mm);
+  require(x_mm.size() <= FT_MAX_SENSORS, "too many sensors");
+  wire_info places{};
+  places.sensor_count = static_cast<std::uint8_t>(x_mm.size());
+  places.pitch_mm = static_cast<float>(pitch_mm);
+  std::copy_n(x_mm.data, x_mm.size(), places.x_mm);
+  std::copy_n(y_mm.data, y_mm.size(), places.y_mm);
+  profile[0] = fingertip::pad::profile_of({thickness_mm, overhang_mm}, places);
+}
+MEASURE_ENTRY(profile_of)
 
 static void tangential_pad(Batch<const fit_array, 1> array, Batch<const pad_profile, 1> profile,
                            Batch<fit_pad, 1> pad) {
