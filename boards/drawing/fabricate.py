@@ -18,8 +18,7 @@ import pcbnew
 
 LAYERS = ("F_Cu", "B_Cu", "F_Mask", "B_Mask", "F_Paste", "B_Paste", "F_SilkS", "B_SilkS", "Edge_Cuts")
 DATED = re.compile(
-    r"^(\*\* (Created on|Drc report)|G04 Created by KiCad|%TF\.(Creation|Generation|ProjectId)|; DRILL file|; #@! TF\.(Creation|Generation)).*\n",
-    re.MULTILINE,
+    r"^(\*\* (Created|Drc)|G04 Created|%TF\.(Creation|Generation|ProjectId)|; DRILL|; #@! TF\.(Creation|Generation)).*\n", re.M
 )
 
 

@@ -53,16 +53,13 @@ LIMITS = {
     "private_words": (150, 150),
     "unformatted_files": (0, 0),
     "longest_function_lines": (60, 60),
-    "board_lines": (900, 959),
+    "board_lines": (900, 958),
     "app_ifs": (1, 1),
 }
 APART = ("firmware/fit/", "firmware/condition/")  # from longest_file
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}
 TEXTS = SOURCES | {".md", ".txt", ".json", ".html", ".in", ".1", ".bash", ".fish", ".cfg", ".msg", ""}
-CIRCUIT_BOARD = (
-    ("boards/drawing/", "tests/checks/"),
-    {"layout.py", "route.py", "board_file.py", "fabricate.py", "pcb.py", "pcb_check.py", "kicad.py", "test_pcb.py"},
-)
+CIRCUIT_BOARD = re.compile(r"boards/drawing/(layout|route|board_file|fabricate|pcb|pcb_check)\.py|tests/checks/(kicad|test_pcb)\.py")
 CODE = {".c", ".h", ".cpp", ".hpp", ".py", ".js", ".mjs", ".ts", ".mts"}
 STAGES = "firmware/app/stages.c"  # lists the stages of each scene
 # Words that readers from elsewhere do not know in this sense, and what the field writes instead.
@@ -222,9 +219,7 @@ def measure(root):
     code = written(root, CODE)
     figures["product_lines"] = sum(text.count("\n") for name, text in code.items() if not name.startswith("tests/"))
     figures["test_lines"] = sum(text.count("\n") for name, text in code.items() if name.startswith("tests/"))
-    figures["board_lines"] = sum(
-        code[name].count("\n") for name in code if name.startswith(CIRCUIT_BOARD[0]) and name.split("/")[-1] in CIRCUIT_BOARD[1]
-    )
+    figures["board_lines"] = sum(text.count("\n") for name, text in code.items() if CIRCUIT_BOARD.fullmatch(name))
     words = private_words(files)
     figures["private_words"] = sum(words.values())
     on_chip = {name: text for name, text in code.items() if name.startswith(("firmware/", "boards/")) and name.endswith((".c", ".h"))}
