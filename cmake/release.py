@@ -100,53 +100,23 @@ def main(argv):
     flags = f"-ffile-prefix-map={source}=."
     (out / f"{name}.tar.gz").write_bytes(packed(run("git", "archive", "--format=tar", f"--prefix={name}/", "HEAD", cwd=source)))
 
+    release_for_chip = ["-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_TOOLCHAIN_FILE={source}/cmake/toolchain-arm-none-eabi.cmake"]
     for board in boards(source):
         for scene in scenes(source):
             print(f"firmware: {board}, {scene}", flush=True)
             build = work / f"{board}-{scene}"
-            run(
-                "cmake",
-                "-G",
-                "Ninja",
-                "-S",
-                source,
-                "-B",
-                build,
-                "-DCMAKE_BUILD_TYPE=Release",
-                f"-DFINGERTIP_BOARD={board}",
-                f"-DFINGERTIP_SCENE={scene}",
-                f"-DCMAKE_TOOLCHAIN_FILE={source}/cmake/toolchain-arm-none-eabi.cmake",
-            )
+            options = [*release_for_chip, f"-DFINGERTIP_BOARD={board}", f"-DFINGERTIP_SCENE={scene}"]
+            run("cmake", "-G", "Ninja", "-S", source, "-B", build, *options)
             run("cmake", "--build", build, "--target", f"fingertip-{board}")
             shutil.copy(build / f"fingertip-{board}.uf2", out / f"{name}-{board}-{scene}.uf2")
 
     print("tool, library and page", flush=True)
     mujoco = source / "build/mujoco"
-    run(
-        sys.executable,
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--require-hashes",
-        "--no-deps",
-        "--target",
-        mujoco,
-        "-r",
-        source / "cmake/mujoco.txt",
-    )
+    exactly = ("--quiet", "--require-hashes", "--no-deps")
+    run(sys.executable, "-m", "pip", "install", *exactly, "--target", mujoco, "-r", source / "cmake/mujoco.txt")
     build = source / "build/host"
-    run(
-        "cmake",
-        "--preset",
-        "host",
-        "-DBUILD_TESTING=OFF",
-        "-DFINGERTIP_WEB=ON",
-        "-DFINGERTIP_IMAGES=",
-        f"-DCMAKE_C_FLAGS={flags}",
-        f"-DCMAKE_CXX_FLAGS={flags}",
-        cwd=source,
-    )
+    options = ["-DBUILD_TESTING=OFF", "-DFINGERTIP_WEB=ON", "-DFINGERTIP_IMAGES="]
+    run("cmake", "--preset", "host", *options, *(f"-DCMAKE_{language}_FLAGS={flags}" for language in ("C", "CXX")), cwd=source)
     run("cmake", "--build", build)
     (out / f"{name}-page.tar.gz").write_bytes(packed(folder_as_tar(build / "host_tools/web/page", f"{name}-page", time_s)))
     run("cpack", "--config", build / "CPackConfig.cmake", "-B", work / "packages")

@@ -44,19 +44,8 @@ def capabilities():
 def build(scene, board, folder):
     """Folder of the images of a scene on a board."""
     place = pathlib.Path(folder).absolute() / scene / board
-    run(
-        "cmake",
-        "-G",
-        "Ninja",
-        "-S",
-        ROOT,
-        "-B",
-        place,
-        f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/toolchain-arm-none-eabi.cmake",
-        "-DCMAKE_BUILD_TYPE=Release",
-        f"-DFINGERTIP_BOARD={board}",
-        f"-DFINGERTIP_SCENE={scene}",
-    )
+    chip = ["-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/toolchain-arm-none-eabi.cmake"]
+    run("cmake", "-G", "Ninja", "-S", ROOT, "-B", place, *chip, f"-DFINGERTIP_BOARD={board}", f"-DFINGERTIP_SCENE={scene}")
     run("cmake", "--build", place, "--target", f"fingertip-{board}", "-j", "1")
     return place
 
