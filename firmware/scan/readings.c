@@ -25,8 +25,10 @@ static uint32_t size_of(int32_t value) { return (uint32_t)(value ^ -(value < 0))
 
 static int32_t difference(int32_t a, int32_t b) { return (int32_t)((uint32_t)a - (uint32_t)b); }
 
-/* The sensor whose reading has stepped while all others of these did not move; all that have fallen. Bitmaps. */
-static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const int32_t last_Pa_q10[], uint32_t *fallen) {
+/* The sensor whose reading has stepped while all others of these did not move; all that have fallen, or risen faster
+ * than presses do. Bitmaps. */
+static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const int32_t last_Pa_q10[], bool is_fast,
+                           uint32_t *jolted) {
   uint32_t stepped = 0;
   uint32_t largest = 0;
   uint32_t second = 0;
@@ -35,7 +37,7 @@ static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const in
       continue;
     }
     const int32_t step = difference(frame->pressure_Pa_q10[k], last_Pa_q10[k]);
-    *fallen |= step < -READINGS_JOLT_Pa_q10 ? UINT32_C(1) << k : 0;
+    *jolted |= step < -READINGS_JOLT_Pa_q10 || (is_fast && step > READINGS_JOLT_Pa_q10) ? UINT32_C(1) << k : 0;
     uint32_t size = size_of(step);
     if (size > largest) {
       second = largest;
@@ -85,14 +87,15 @@ static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *rea
                                                             int32_t kept_Pa_q10[]) {
   const bool all = usable == all_sensors(frame->sensor_count);
   const uint32_t seen = usable & (readings->has_last | readings->awaited);
-  uint32_t fallen = 0;
-  uint32_t stepped = find_alone(frame, seen, last_Pa_q10, &fallen);
+  uint32_t jolted = 0;
+  const bool is_fast = frame->t_us - readings->t_us < READINGS_FAST_us;
+  uint32_t stepped = find_alone(frame, seen, last_Pa_q10, is_fast, &jolted);
   stepped = readings->presses_are_shared ? stepped : 0;
   const uint32_t alone = all ? stepped & readings->has_last : 0;
   readings->restored |= alone | (stepped & readings->awaited);
   readings->awaited &= ~usable;
   judge_alone(readings, alone, frame, last_Pa_q10);
-  readings->jolted |= alone ? 0 : fallen & readings->has_last;
+  readings->jolted |= alone ? 0 : jolted & readings->has_last;
   uint32_t low = 0;
   uint32_t bit = 1;
   for (uint8_t k = 0; k < frame->sensor_count; k++, bit <<= 1) {
@@ -152,6 +155,7 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], u
     left_out = look_closer(readings, frame, usable, last_Pa_q10, kept_Pa_q10);
   }
   readings->last_sum = glance.sum;
+  readings->t_us = frame->t_us;
   readings->counted = usable & ~left_out;
 
   const uint32_t valid = readings->counted & ~readings->unproven;

@@ -16,9 +16,9 @@
  * conversion was lost, or its pressure falls, and its temperature steps. So one that reads 0 is left out until its next
  * temperature, which is asked for at once. One whose pressure falls by READINGS_JOLT_Pa_q10 at once with others' is
  * doubtful until then, but used, for a release does the same where frames are 5 ms or more apart in the twin: at 57
- * frames/s each quick release of more than 6 kPa. Only frames whose sum moves by as much are searched for it: moves
- * that compensate each other hide a fall. If the temperature has stepped from the sensor's own last it has lost its
- * state, whatever the others do.
+ * frames/s each quick release of more than 6 kPa. So is one that rises by as much within READINGS_FAST_us. Only frames
+ * whose sum moves by as much are searched for it: moves that compensate each other hide a fall. If the temperature has
+ * stepped from the sensor's own last it has lost its state, whatever the others do.
  *
  * A suspect is left out until it has been reset and its PROM read again. Then its temperature and its pressure count as
  * its first. Its zero still holds, since it is the same sensor, unless it was measured shortly before (condition.h).
@@ -53,6 +53,8 @@
 #define READINGS_STILL_NOISES 6
 /* From one reading to the next. Codes that are 3 % off make 8 kPa. */
 #define READINGS_JOLT_Pa_q10 (MS58XX_STEP_Pa * 768)
+/* Within it no press rises by as much, but a hard tap. */
+#define READINGS_FAST_us 6000u
 #define READINGS_ALONE 256
 /* Moulding presses on the sensors: at rest those of four real strips differed by 2 to 12 kPa. A
  * sensitivity that is off by 1 % moves the reading at 1 bar by 2.9 kPa: what is apart by less
@@ -65,6 +67,7 @@ struct readings {
   int16_t doubted_cC[FT_MAX_SENSORS];     /* [sensor] the temperature that was not used */
   int32_t last_Pa_q10[2][FT_MAX_SENSORS]; /* [newest][sensor] the last that counted */
   uint8_t newest;
+  uint64_t t_us;          /* of the last frame */
   int16_t temperature_cC; /* mean of the sensors admitted, the last one if there is none */
   uint8_t doubts_in_a_row;
   uint32_t has_thermal;    /* bitmap */

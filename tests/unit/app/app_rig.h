@@ -18,6 +18,8 @@
 #define PI 3.14159265358979
 
 static struct sim_array array;
+static struct array_bus bus;
+static bool rig_is_parallel; /* a data line for each sensor; else behind multiplexers */
 static struct app app;
 static struct wire_receiver receiver;
 static uint16_t host_sequence;
@@ -67,7 +69,10 @@ static inline void rig_power_up_at(uint64_t t_us, bool watchdog_struck) {
   array.noise = 1.0;
   native_set_event_source(next_event_us, &array);
   port_set_event_handler(on_event, &app);
-  app_start(&app, sim_array_bus(&array));
+  array.parallel = rig_is_parallel;
+  bus = *sim_array_bus(&array);
+  bus.answers_are_single = rig_is_parallel;
+  app_start(&app, &bus);
   wire_receiver_init(&receiver, wire_all_layouts);
   host_sequence = 0;
 }

@@ -292,7 +292,7 @@ TEST(a_second_processor_gives_the_same_answers) {
     TEST_ASSERT_EQUAL(1, native_worker_starts());
     TEST_ASSERT_EQUAL(counts[0], counts[1]);
     for (unsigned i = 0; i < counts[0]; i++) {
-      TEST_ASSERT_TRUE(!pulled || two[i].stages.fit_us >= takes_us);
+      TEST_ASSERT_TRUE(!pulled || two[i].flags & CONTACT_FLAG_HELD || two[i].stages.fit_us >= takes_us);
       two[i].stages = contacts[i].stages;
       TEST_ASSERT_EQUAL_MEMORY(&contacts[i], &two[i], sizeof two[i]);
     }
@@ -315,5 +315,5 @@ TEST(without_an_answer_frames_go_out_with_the_fit_and_say_so) {
   TEST_ASSERT_EQUAL_FLOAT(app.found.fit.x_mm, contacts[count - 1].x_mm);
   uint8_t detail;
   TEST_ASSERT_EQUAL(CRASH_EVENT_WORKER, native_last_event(&detail));
-  TEST_ASSERT_GREATER_THAN(count, native_worker_starts());
+  TEST_ASSERT_GREATER_OR_EQUAL(count, native_worker_starts());
 }

@@ -142,39 +142,6 @@ TEST(at_the_slowest_rate_the_watchdog_is_fed) {
   run_for(25000);
 }
 
-/* One, several or all, with any codes: no frame is wrong without a warning. */
-TEST(sensors_that_lost_their_state_are_reset_and_not_believed) {
-  static const double shares[] = {0.5, 0.7, 0.83, 0.9375, 0.97};
-  const uint32_t warnings = CONTACT_FLAG_SENSOR_DOUBTFUL | CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT;
-  for (unsigned n = 1; n <= geometry.sensor_count; n += 2) {
-    rig_start();
-    press.force_N = 5.5;
-    press.from_us = 900000;
-    connect_for(600);
-    start_streams(WIRE_STREAM_CONTACT);
-    native_run_until(port_now_us() + 1500000 + 613 * n, main_round, &app);
-    drop_packets();
-    for (unsigned k = 0; k < n; k++) {
-      sim_ms5840_brown_out(&array.sensor[(k + 4 * n) % geometry.sensor_count]);
-      array.sensor[(k + 4 * n) % geometry.sensor_count].share = shares[n / 2 % 5];
-    }
-    for (int ms = 1; ms < 300; ms++) {
-      run_for(1);
-      for (unsigned k = 0; ms > 30 && k < n; k++) {
-        TEST_ASSERT_FALSE(array.sensor[(k + 4 * n) % geometry.sensor_count].untrimmed);
-      }
-      for (struct wire_packet p; next_of_type(WIRE_CONTACT, &p);) {
-        const uint32_t flags = p.body.contact.flags;
-        const bool none = n > 12 && !(flags & CONTACT_FLAG_FIT_VALID); /* fewer than three are left */
-        TEST_ASSERT_FALSE(flags & CONTACT_FLAG_SLIP);
-        TEST_ASSERT_TRUE((flags & (none ? warnings | CONTACT_FLAG_SENSOR_MASKED : warnings)) ||
-                         fabsf(p.body.contact.force_N - 5.5f) < 0.55f);
-      }
-    }
-    TEST_ASSERT_EQUAL_HEX32(0x7FFF, app.found.frame.valid);
-  }
-}
-
 /* In the frame that is held for the temperature already, and until a temperature says otherwise. */
 TEST(test_a_sensor_whose_temperature_jumps_is_told_to_be_doubtful) {
   press.force_N = 5.0;

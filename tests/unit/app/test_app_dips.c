@@ -1,0 +1,118 @@
+/* Supplies of sensors that dip amid a press: one to all of them, at any phase of a frame, behind multiplexers and with a
+ * data line each. In the environment DIPS, "EVERY SEED": only so many of the cases, for example "1 1" for all. */
+#include "app_rig.h"
+#include "common/contact_flags.h"
+#include "support/random.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+
+#define FORCE_N 5.5
+#define RAW_MAX_Pa 2500.0 /* a tenth of the press's peak */
+enum { PHASES = 16, EVERY = 150, FOLLOWED_ms = 2500, RESET_MAX_ms = 30 };
+
+static const double shares[] = {0.5, 0.7, 0.83, 0.9375, 0.97, 1.03}; /* of the true codes */
+static const uint32_t warnings = CONTACT_FLAG_SENSOR_DOUBTFUL | CONTACT_FLAG_ZERO_DOUBTFUL | CONTACT_FLAG_UNCERTAIN |
+                                 CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL;
+
+struct found {
+  unsigned cases, wrong_unflagged_frames, false_slips, raw_valid_wrong, reset_ms_max;
+};
+
+static double scale = 1.0; /* of all pressures */
+static double scaled_pressure_Pa(void *context, unsigned sensor, uint64_t t_us) {
+  return scale * world_pressure_Pa(context, sensor, t_us);
+}
+
+static void press_for(double force_N, uint32_t ms) {
+  rig_start();
+  array.world.pressure_Pa = scaled_pressure_Pa;
+  press.force_N = force_N;
+  press.x_mm = 2.1;
+  press.y_mm = 3.3;
+  press.from_us = 900000;
+  connect_for(600);
+  start_streams(WIRE_STREAM_CONTACT | WIRE_STREAM_RAW);
+  run_for(ms);
+}
+
+/* Fewer than four sensors give no force, and say so. */
+static bool is_wrong(const struct wire_contact *contact, bool few_are_left) {
+  const uint32_t excuses = warnings | (few_are_left ? CONTACT_FLAG_SENSOR_MASKED : 0);
+  if (!(contact->flags & CONTACT_FLAG_FIT_VALID)) {
+    return !(contact->flags & excuses);
+  }
+  return !(contact->flags & warnings) && (fabs((double)contact->force_N - FORCE_N) > 0.1 * FORCE_N ||
+                                          hypot((double)contact->x_mm - press.x_mm, (double)contact->y_mm - press.y_mm) > 0.6);
+}
+
+static void dip(unsigned count, unsigned first, uint32_t phase_us, double share, struct found *found) {
+  const uint8_t sensors = geometry.sensor_count;
+  press_for(FORCE_N, 1500);
+  native_run_until(port_now_us() + phase_us, main_round, &app);
+  drop_packets();
+  for (unsigned k = first; k < first + count; k++) {
+    sim_ms5840_brown_out(&array.sensor[k % sensors]);
+    array.sensor[k % sensors].share = share;
+  }
+  unsigned reset_ms = 0;
+  for (unsigned ms = 1; ms <= FOLLOWED_ms; ms++) {
+    run_for(1);
+    for (unsigned k = 0; k < sensors; k++) {
+      reset_ms = array.sensor[k].untrimmed ? ms + 1 : reset_ms;
+    }
+    for (struct wire_packet p; next_packet(&p);) {
+      if (p.type == WIRE_CONTACT) {
+        found->wrong_unflagged_frames += is_wrong(&p.body.contact, sensors - count < 4);
+        found->false_slips += (p.body.contact.flags & CONTACT_FLAG_SLIP) != 0;
+      }
+      const uint32_t believed = p.type == WIRE_RAW ? p.body.raw.valid & ~p.body.raw.doubtful : 0;
+      for (unsigned k = 0; k < sensors; k++) {
+        const double off_Pa = p.body.raw.pressure_Pa_q10[k] / 1024.0 - world_pressure_Pa(NULL, k, port_now_us());
+        found->raw_valid_wrong += (believed >> k & 1) && fabs(off_Pa) > RAW_MAX_Pa;
+      }
+    }
+  }
+  found->reset_ms_max = reset_ms > found->reset_ms_max ? reset_ms : found->reset_ms_max;
+  found->cases++;
+}
+
+TEST(dips_are_found_and_no_frame_is_wrong_without_a_warning) {
+  unsigned every = EVERY;
+  unsigned long long seed = 1;
+  const char *asked = getenv("DIPS");
+  if (asked) {
+    TEST_ASSERT_EQUAL(2, sscanf(asked, "%u %llu", &every, &seed));
+  }
+  struct random random = {seed};
+  for (unsigned i = 0; i < 2 * sizeof shares / sizeof shares[0]; i++) {
+    struct found found = {0};
+    rig_is_parallel = i % 2;
+    for (unsigned n = 0; n < 15 * PHASES; n++) {
+      const unsigned first = random_below(&random, geometry.sensor_count);
+      if (random_below(&random, every) == 0) {
+        dip(1 + n / PHASES, first, n % PHASES * (rig_is_parallel ? 2460u : 4900u) / PHASES + 1, shares[i / 2], &found);
+      }
+    }
+    printf("{\"board\":\"%s\",\"share\":%.4f,\"cases\":%u,\"wrong_unflagged_frames\":%u,\"false_slips\":%u,"
+           "\"raw_valid_wrong\":%u,\"reset_ms_max\":%u}\n",
+           i % 2 ? "pico_parallel" : "pico_mux", shares[i / 2], found.cases, found.wrong_unflagged_frames,
+           found.false_slips, found.raw_valid_wrong, found.reset_ms_max);
+    TEST_ASSERT_TRUE(asked || (found.cases > 0 && found.wrong_unflagged_frames + found.false_slips + found.raw_valid_wrong == 0));
+    TEST_ASSERT_TRUE(asked || found.reset_ms_max <= RESET_MAX_ms);
+  }
+}
+
+/* Parts of another range read a twentieth. */
+TEST(an_array_of_another_range_is_not_trusted) {
+  scale = 0.05;
+  press_for(20.0, 2500);
+  unsigned trusted = 0, frames = 0;
+  for (struct wire_packet p; next_of_type(WIRE_CONTACT, &p); frames++) {
+    trusted += (p.body.contact.flags & (CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_SENSOR_DOUBTFUL)) == CONTACT_FLAG_FIT_VALID;
+  }
+  printf("{\"wrong_range_frames\":%u,\"wrong_range_trusted\":%u}\n", frames, trusted);
+  TEST_ASSERT_EQUAL(0, trusted);
+  TEST_ASSERT_GREATER_THAN(100, frames);
+  scale = 1.0;
+}
