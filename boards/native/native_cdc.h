@@ -1,6 +1,4 @@
-/* usb/cdc.h on the host: a byte stream in memory whose far end is the test. Linked in place of the
- * USB device.
- */
+/* usb/cdc.h on the host: a byte stream in memory whose far end is the test. Linked in place of the USB device. */
 #pragma once
 
 #include "usb/cdc.h"

@@ -7,8 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* More events, or rounds of the main loop, at one moment are a program that never lets time pass.
- */
+/* More events, or rounds of the main loop, at one moment are a program that never lets time pass. */
 enum { MAX_AT_ONCE = 10000 };
 
 static struct {

@@ -1,11 +1,9 @@
-/* port/port.h on the host, in virtual time: time passes only in native_run_until() and
- * port_sleep(), from one event to the next, so a run is exact, repeatable and as fast as the host.
+/* port/port.h on the host, in virtual time: time passes only in native_run_until() and port_sleep(), from one event to
+ * the next, so a run is exact, repeatable and as fast as the host.
  *
- * Events are the alarm and those of one source, such as the simulated bus. At each, the event
- * handler runs; computing takes no time. What the target cannot survive stops the test program with
- * a message: a main loop that sleeps with no event to come, and a program that never lets time
- * pass.
- */
+ * Events are the alarm and those of one source, such as the simulated bus. At each, the event handler runs; computing
+ * takes no time. What the target cannot survive stops the test program with a message: a main loop that sleeps with no
+ * event to come, and a program that never lets time pass. */
 #pragma once
 
 #include "common/crash.h"

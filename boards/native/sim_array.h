@@ -1,10 +1,9 @@
-/* A simulated array of MS5840 behind array_bus, with bus times like those of multiplexers and a
- * fault on request at any transfer. Time is the caller's: nothing happens but at poll(), and each
- * transfer is then applied at the time at which it ended on the bus.
+/* A simulated array of MS5840 behind array_bus, with bus times like those of multiplexers and a fault on request at any
+ * transfer. Time is the caller's: nothing happens but at poll(), and each transfer is then applied at the time at which
+ * it ended on the bus.
  *
- * Transfers are counted from 1: each broadcast of a command is one, each read of one sensor is one.
- * After start_* advance time to the earlier of *wake_us and sim_array_next_event_us(), and poll.
- */
+ * Transfers are counted from 1: each broadcast of a command is one, each read of one sensor is one. After start_*
+ * advance time to the earlier of *wake_us and sim_array_next_event_us(), and poll. */
 #pragma once
 
 #include "array_bus/array_bus.h"

@@ -5,8 +5,7 @@
 
 enum { RESET = 0x1E, READ_ADC = 0x00, READ_PROM = 0xA0, CODE_MAX = 0xFFFFFF };
 
-/* Datasheet, "Performance specifications": ADC, resolution rms. Index: low nibble of the convert
- * command over two. */
+/* Datasheet, "Performance specifications": ADC, resolution rms. Index: low nibble of the convert command over two. */
 static const struct {
   unsigned osr;
   uint32_t conversion_us;

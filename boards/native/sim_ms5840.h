@@ -1,13 +1,11 @@
-/* One simulated MS5840-02BA, or MS5837-30BA by FINGERTIP_SENSOR, as seen from its two wires: what it
- * acknowledges, answers and forgets, and when. Written from the datasheet, apart from the driver in firmware/ms58xx, so
- * that the two can be tested against each other.
+/* One simulated MS5840-02BA, or MS5837-30BA by FINGERTIP_SENSOR, as seen from its two wires: what it acknowledges,
+ * answers and forgets, and when. Written from the datasheet, apart from the driver in firmware/ms58xx, so that the two
+ * can be tested against each other.
  *
- * Behaviour: after power-up nothing but the reset command works; it takes 2.8 ms, during which the
- * sensor acknowledges nothing. A conversion takes the datasheet's maximum. Its result can be read
- * once; without one the sensor answers 0. Reading during a conversion answers 0 and spoils the
- * result, and so does a second conversion command: the spoiled result is 1/8 too small, so that it
- * resembles a measurement. Word 7 of the PROM is not acknowledged.
- */
+ * Behaviour: after power-up nothing but the reset command works; it takes 2.8 ms, during which the sensor acknowledges
+ * nothing. A conversion takes the datasheet's maximum. Its result can be read once; without one the sensor answers 0.
+ * Reading during a conversion answers 0 and spoils the result, and so does a second conversion command: the spoiled
+ * result is 1/8 too small, so that it resembles a measurement. Word 7 of the PROM is not acknowledged. */
 #pragma once
 
 #include <stdbool.h>
@@ -54,13 +52,11 @@ void sim_ms5840_init(struct sim_ms5840 *sensor, const uint16_t c[6]);
 /* Supply off and on: the sensor needs a reset, a conversion is lost. */
 void sim_ms5840_power_cycle(struct sim_ms5840 *sensor);
 
-/* Supply down and up, not as far as that: the sensor goes on converting, but until a reset its
- * codes are 1/16 too small, or as the caller sets .share. A conversion is lost. That there are such
- * sensors is assumed. */
+/* Supply down and up, not as far as that: the sensor goes on converting, but until a reset its codes are 1/16 too
+ * small, or as the caller sets .share. A conversion is lost. That there are such sensors is assumed. */
 void sim_ms5840_brown_out(struct sim_ms5840 *sensor);
 
-/* A command byte that ends at t_us, alone in its transfer or before a read. False: not
- * acknowledged. */
+/* A command byte that ends at t_us, alone in its transfer or before a read. False: not acknowledged. */
 bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_us, sim_ms5840_measure *measure,
                         void *context);
 

@@ -69,8 +69,7 @@ static void begin(struct mux_bus *bus, enum mux_bus_transaction what, enum ft_st
   bus->controller_busy = status == FT_ERR_BUSY;
 }
 
-/* Starts the selection of these channels unless they are on already or the multiplexer is absent.
- */
+/* Starts the selection of these channels unless they are on already or the multiplexer is absent. */
 static bool select(struct mux_bus *bus, unsigned mux, uint8_t channels) {
   if (bus->open[mux] == channels || (bus->absent >> mux & 1) != 0) {
     return false;

@@ -1,14 +1,12 @@
 /* array_bus over one SCL and a data line for each sensor, by PIO and DMA.
  *
- * A command takes 49 us and a read of three bytes 146 us on the bus at 397 kHz, for all sensors at
- * once: they sample at the same moment, and the skew between them is that of their own oscillators.
+ * A command takes 49 us and a read of three bytes 146 us on the bus at 397 kHz, for all sensors at once: they sample at
+ * the same moment, and the skew between them is that of their own oscillators.
  *
- * A line that is low while all should be high is stuck: its sensor does not
- * acknowledge, and the others go on. Before the next command the stuck lines, and only they, get
- * the nine clocks and the STOP that free a sensor which has lost its place, and, while that does
- * not help, ever more rarely. Clocks that do not follow are a failure of the whole bus: the
- * operation ends with FT_ERR_TIMEOUT and a recovery must free SCL.
- */
+ * A line that is low while all should be high is stuck: its sensor does not acknowledge, and the others go on. Before
+ * the next command the stuck lines, and only they, get the nine clocks and the STOP that free a sensor which has lost
+ * its place, and, while that does not help, ever more rarely. Clocks that do not follow are a failure of the whole bus:
+ * the operation ends with FT_ERR_TIMEOUT and a recovery must free SCL. */
 #pragma once
 
 #include "array_bus/array_bus.h"
@@ -46,6 +44,5 @@ struct parallel_bus {
   _Alignas(uint32_t) uint16_t samples[I2C_WAVE_READ_CELLS];
 };
 
-/* Opens the lines. FT_ERR_TIMEOUT: a block of the chip does not start. Fills *array_bus, which
- * refers to *bus. */
+/* Opens the lines. FT_ERR_TIMEOUT: a block of the chip does not start. Fills *array_bus, which refers to *bus. */
 enum ft_status parallel_bus_init(struct parallel_bus *bus, struct array_bus *array_bus);

@@ -32,8 +32,7 @@ enum command {
 };
 enum { STATUS_BUSY = 1 << 0, ID_DUMMY_BYTES = 4, HEAD_BYTES = 4 };
 
-/* The FIFOs hold 16 frames, and 16 bytes at 31.25 MHz take 4.1 us. A poll takes 8 cycles or more.
- */
+/* The FIFOs hold 16 frames, and 16 bytes at 31.25 MHz take 4.1 us. A poll takes 8 cycles or more. */
 enum { FIFO_FRAMES = 16, EXCHANGE_POLLS = 1000 };
 _Static_assert(HEAD_BYTES + PORT_FLASH_READ_BYTES <= FIFO_FRAMES, "a reading is one exchange");
 /* Of a page that is written: 3.1 us with the head, so that no frame waits long. */

@@ -1,6 +1,5 @@
-/* Pins of bank 0: function, pad and level (RP2040 datasheet 2.19 IO_BANK0 and PADS_BANK0, 2.3.1.2
- * SIO). IO_BANK0 and PADS_BANK0 must be out of reset.
- */
+/* Pins of bank 0: function, pad and level (RP2040 datasheet 2.19 IO_BANK0 and PADS_BANK0, 2.3.1.2 SIO). IO_BANK0 and
+ * PADS_BANK0 must be out of reset. */
 #pragma once
 
 #include <stdbool.h>

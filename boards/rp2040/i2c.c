@@ -70,10 +70,9 @@ void i2c_close_to_lines(const struct i2c_pins *pins) {
   resets_assert(RESETS_I2C0);
 }
 
-/* After a STOP the controller keeps the bus free for LOW_CYCLES, and only then is disabled and lets
- * IC_TAR be written. Often that time has passed before the next transaction is known; the rest of
- * it is shorter than an alarm, so it is polled: at five cycles or more a read, for at most 2 us
- * unless the bus is held. */
+/* After a STOP the controller keeps the bus free for LOW_CYCLES, and only then is disabled and lets IC_TAR be written.
+ * Often that time has passed before the next transaction is known; the rest of it is shorter than an alarm, so it is
+ * polled: at five cycles or more a read, for at most 2 us unless the bus is held. */
 enum { IDLE_POLLS = 50 };
 
 static enum ft_status load_when_idle(void) {

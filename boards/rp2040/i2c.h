@@ -1,13 +1,11 @@
-/* I2C0 as the bus master of single short transactions at 400 kHz, and its two lines as plain pins
- * for the recovery of a stuck bus.
+/* I2C0 as the bus master of single short transactions at 400 kHz, and its two lines as plain pins for the recovery of a
+ * stuck bus.
  *
- * A transaction fits into the FIFO whole, so it is loaded at once and needs no code until its STOP,
- * whose interrupt calls the owner, who may start the next one from there. Nothing here waits, but
- * for a block to leave reset (a few cycles) and for the bus-free time after a STOP (2 us), both
- * bounded. One context: the event handler's.
+ * A transaction fits into the FIFO whole, so it is loaded at once and needs no code until its STOP, whose interrupt
+ * calls the owner, who may start the next one from there. Nothing here waits, but for a block to leave reset (a few
+ * cycles) and for the bus-free time after a STOP (2 us), both bounded. One context: the event handler's.
  *
- * Source: RP2040 datasheet 4.3; I2C-bus specification UM10204, fast mode.
- */
+ * Source: RP2040 datasheet 4.3; I2C-bus specification UM10204, fast mode. */
 #pragma once
 
 #include "common/status.h"
@@ -28,8 +26,7 @@ struct i2c_owner {
   void *context;
 };
 
-/* Connects controller and pins, ready for a transaction. FT_ERR_TIMEOUT: a block does not leave
- * reset. */
+/* Connects controller and pins, ready for a transaction. FT_ERR_TIMEOUT: a block does not leave reset. */
 enum ft_status i2c_open(const struct i2c_pins *pins, struct i2c_owner owner);
 
 /* Puts the controller into reset, in the middle of a transaction too, which lets go of both lines,
@@ -50,8 +47,7 @@ enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count);
 enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]);
 #define I2C_IDLE_us 5u
 
-/* Time on the bus of the two kinds of transaction at 400 kHz: 9 clocks a byte, 1 for START and for
- * STOP. */
+/* Time on the bus of the two kinds of transaction at 400 kHz: 9 clocks a byte, 1 for START and for STOP. */
 #define I2C_WRITE_us 50u
 #define I2C_READ_us(byte_count) ((11u * 5u + 9u * 5u * (byte_count) + 1u) / 2u)
 

@@ -1,6 +1,5 @@
-/* Access to memory-mapped registers, and the atomic aliases that every APB and AHB-Lite peripheral
- * has besides its plain addresses (RP2040 datasheet 2.1.2). SIO has no aliases.
- */
+/* Access to memory-mapped registers, and the atomic aliases that every APB and AHB-Lite peripheral has besides its
+ * plain addresses (RP2040 datasheet 2.1.2). SIO has no aliases. */
 #pragma once
 
 #include <stdint.h>

@@ -1,23 +1,21 @@
-/* The controller keeps no toggles and no state of its own worth speaking of: each packet's PID is
- * in its buffer control word, and software reads from BUFF_STATUS what has happened (RP2040
- * datasheet 4.1.2). Every endpoint is single-buffered.
+/* The controller keeps no toggles and no state of its own worth speaking of: each packet's PID is in its buffer control
+ * word, and software reads from BUFF_STATUS what has happened (RP2040 datasheet 4.1.2). Every endpoint is
+ * single-buffered.
  *
- * Errata: E2 (an abort blocks the controller for good) and E5 (a busy bus hides the end of a bus
- * reset) are fixed in revision B2 of the chip. On B0 and B1 aborts are left out, and against E5 the
- * bus is made to look idle after a reset, if the board can spare GPIO15 for it: else the device may
- * not enumerate there behind a hub with traffic (pico-sdk, rp2040_usb_device_enumeration.c). E15
- * (some bus errors in an IN transfer hang the device) is in all revisions: no bulk IN packet is
- * offered in the last 200 us of a frame, where such errors come from. It can still strike (TinyUSB
- * pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even
- * a bus reset. So the block is reset, and the device attached again, when the bus is silent and not
- * suspended, or when frames but no request follow a reset of the bus. A hung controller that goes
- * on seeing frames, under a host that resets nothing, is not noticed.
+ * Errata: E2 (an abort blocks the controller for good) and E5 (a busy bus hides the end of a bus reset) are fixed in
+ * revision B2 of the chip. On B0 and B1 aborts are left out, and against E5 the bus is made to look idle after a reset,
+ * if the board can spare GPIO15 for it: else the device may not enumerate there behind a hub with traffic (pico-sdk,
+ * rp2040_usb_device_enumeration.c). E15 (some bus errors in an IN transfer hang the device) is in all revisions: no
+ * bulk IN packet is offered in the last 200 us of a frame, where such errors come from. It can still strike (TinyUSB
+ * pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even a bus reset. So the
+ * block is reset, and the device attached again, when the bus is silent and not suspended, or when frames but no
+ * request follow a reset of the bus. A hung controller that goes on seeing frames, under a host that resets nothing, is
+ * not noticed.
  *
- * The number of resets before the request shows nothing. An EHCI controller sends no frame after its
- * own reset of a full-speed device; its companion then resets the device again (Linux, ehci-hub.c
- * check_reset_complete()). And the erratum strikes a controller that answers, so one that has not
- * yet heard a request since its block was reset waits for as long as the host takes.
- */
+ * The number of resets before the request shows nothing. An EHCI controller sends no frame after its own reset of a
+ * full-speed device; its companion then resets the device again (Linux, ehci-hub.c check_reset_complete()). And the
+ * erratum strikes a controller that answers, so one that has not yet heard a request since its block was reset waits
+ * for as long as the host takes. */
 #include "rp2040/usb_controller.h"
 
 #include "port/port.h"
@@ -45,8 +43,7 @@ enum { PIN_DP = 15, FEIGNED_MAX_ms = 5 };
 #define PACKET_us 60u
 #define ABORT_LIMIT_us 200u
 
-/* How often the bus is checked, and how long it may be silent: each millisecond a frame begins.
- */
+/* How often the bus is checked, and how long it may be silent: each millisecond a frame begins. */
 #define WATCH_us 250000u
 #define SILENCE_us 1000000u
 /* From the first frame after a reset to the request. Linux takes 60 ms (hub.c hub_port_reset()),

@@ -9,8 +9,7 @@ extern const bool usb_controller_has_gpio15;
 
 void usbctrl_irq_handler(void);
 
-/* A line without a block: what usbctrl_irq_handler() leaves, and usb_controller_request_service().
- */
+/* A line without a block: what usbctrl_irq_handler() leaves, and usb_controller_request_service(). */
 void usb_service_irq_handler(void);
 
 /* TIMER alarm 1: the watch over the controller. */

@@ -12,10 +12,9 @@
 #define WATCHDOG_LOAD REG32(WATCHDOG_BASE + 0x04u)
 #define WATCHDOG_REASON REG32(WATCHDOG_BASE + 0x08u) /* 0: this start was no watchdog's */
 #define WATCHDOG_REASON_TIMER (1u << 0)              /* not fed; else triggered */
-/* Survive the watchdog's reset, and nothing else. The boot ROM reads 4 to 7, of which 4 makes it
- * start from elsewhere, and writes 0 and 1 on its way into the USB loader (pico-bootrom-rp2040,
- * bootrom_rt0.S "Check watchdog scratch" and bootrom_main.c reset_usb_boot(); the SDK uses 4 in
- * watchdog_enable()). */
+/* Survive the watchdog's reset, and nothing else. The boot ROM reads 4 to 7, of which 4 makes it start from elsewhere,
+ * and writes 0 and 1 on its way into the USB loader (pico-bootrom-rp2040, bootrom_rt0.S "Check watchdog scratch" and
+ * bootrom_main.c reset_usb_boot(); the SDK uses 4 in watchdog_enable()). */
 #define WATCHDOG_SCRATCH0 REG32(WATCHDOG_BASE + 0x0cu)
 #define WATCHDOG_SCRATCH1 REG32(WATCHDOG_BASE + 0x10u)
 #define WATCHDOG_SCRATCH2 REG32(WATCHDOG_BASE + 0x14u)

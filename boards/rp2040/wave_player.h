@@ -36,9 +36,8 @@ enum {
  * a block does not leave reset. */
 enum ft_status wave_player_open(void);
 
-/* Starts a wave of cell_count cells (even, not 0). The one before must have ended. Both tables are
- * aligned to words and in use until the end: steps[cell * WAVE_STEPS_PER_CELL + step];
- * samples[cell], bitmap of the lines that were high. */
+/* Starts a wave of cell_count cells (even, not 0). The one before must have ended. Both tables are aligned to words and
+ * in use until the end: steps[cell * WAVE_STEPS_PER_CELL + step]; samples[cell], bitmap of the lines that were high. */
 void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_count);
 
 /* All samples are there. The last three steps are still to come, before those of the next wave. */

@@ -1,6 +1,5 @@
-/* Stage: pressure above the zero, and whether anything touches (condition/condition.h).
- * Reads findings.frame. Writes findings.conditioned. Asks the scan for a temperature where one may explain a reading.
- */
+/* Stage: pressure above the zero, and whether anything touches (condition/condition.h). Reads findings.frame. Writes
+ * findings.conditioned. Asks the scan for a temperature where one may explain a reading. */
 #pragma once
 
 #include "app/findings.h"

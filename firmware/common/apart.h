@@ -1,10 +1,9 @@
 /* Which of several measurements of one quantity is apart from the others.
  *
- * Apart is what differs from the median by more than a floor and APART_SPREADS times the median of
- * the differences. So the others show how far apart is far: bare barometers agree to 0.4 kPa,
- * moulded ones to some kPa. In four real strips under rubber one sensor was up to 8.2 times the
- * median difference off (JiannnH/MTL-BaroTactileSensor, 2023), and that is no fault. With fewer
- * than APART_VOTERS_MIN nothing is apart. */
+ * Apart is what differs from the median by more than a floor and APART_SPREADS times the median of the differences. So
+ * the others show how far apart is far: bare barometers agree to 0.4 kPa, moulded ones to some kPa. In four real strips
+ * under rubber one sensor was up to 8.2 times the median difference off (JiannnH/MTL-BaroTactileSensor, 2023), and that
+ * is no fault. With fewer than APART_VOTERS_MIN nothing is apart. */
 #pragma once
 
 #include <stdint.h>

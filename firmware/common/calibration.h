@@ -1,6 +1,5 @@
-/* A calibration of one pad, as `fingertip calibrate` finds it by pressing the pad with one weight,
- * and as the packets carry it and the fingertip keeps it.
- */
+/* A calibration of one pad, as `fingertip calibrate` finds it by pressing the pad with one weight, and as the packets
+ * carry it and the fingertip keeps it. */
 #pragma once
 
 #include "common/limits.h"

@@ -1,7 +1,5 @@
-/* CRC-32/ISO-HDLC (polynomial 0x04C11DB7 reflected, init and xor-out 0xFFFFFFFF): the CRC of
- * Ethernet, zlib and PNG. Check value of "123456789": 0xCBF43926.
- * By half bytes: a byte costs some fourteen Cortex-M0+ cycles.
- */
+/* CRC-32/ISO-HDLC (polynomial 0x04C11DB7 reflected, init and xor-out 0xFFFFFFFF): the CRC of Ethernet, zlib and PNG.
+ * Check value of "123456789": 0xCBF43926. By half bytes: a byte costs some fourteen Cortex-M0+ cycles. */
 #pragma once
 
 #include <stddef.h>
@@ -10,8 +8,7 @@
 
 uint32_t crc32_iso_hdlc(const uint8_t *bytes, size_t length);
 
-/* Value by value, as little-endian bytes: begin with CRC32_BEGIN; the CRC is the complement of the
- * last. */
+/* Value by value, as little-endian bytes: begin with CRC32_BEGIN; the CRC is the complement of the last. */
 #define CRC32_BEGIN UINT32_MAX
 
 extern const uint32_t crc32_table[16];

@@ -1,6 +1,5 @@
-/* One status type for the whole firmware: zero or positive is progress, negative is failure.
- * Functions write their outputs only when they return FT_OK.
- */
+/* One status type for the whole firmware: zero or positive is progress, negative is failure. Functions write their
+ * outputs only when they return FT_OK. */
 #pragma once
 
 enum ft_status {

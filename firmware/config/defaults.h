@@ -43,11 +43,10 @@
 #define DEFAULT_PRIOR_SIGMA_mm (0.001f * FINGERTIP_PRIOR_SIGMA_UM)
 #define DEFAULT_PRIOR_WIDTH_mm (FINGERTIP_PRIOR_SIGMA_UM > 0 ? 0.001f * FINGERTIP_PRIOR_WIDTH_UM : 0.0f)
 
-/* Relative standard deviation of a sensor's gain, on a pad that was never calibrated. The gains of
- * a real strip of four barometers under rubber differ by +-10 % (JiannnH/MTL-BaroTactileSensor,
- * Imperial College London, 2023). To take that as one standard deviation is the stricter reading.
- * Four sensors hardly determine it, so this is a twentieth more. The twentieth takes bad locations
- * without a warning from 1.4 to 1.2 % of the touches (report truth, part fit). */
+/* Relative standard deviation of a sensor's gain, on a pad that was never calibrated. The gains of a real strip of four
+ * barometers under rubber differ by +-10 % (JiannnH/MTL-BaroTactileSensor, Imperial College London, 2023). To take that
+ * as one standard deviation is the stricter reading. Four sensors hardly determine it, so this is a twentieth more. The
+ * twentieth takes bad locations without a warning from 1.4 to 1.2 % of the touches (report truth, part fit). */
 #define DEFAULT_GAIN_SD 0.105f
 /* Error of the Gaussian for a layer of rubber, as a share of the largest reading. With it one
  * standard deviation covers 57 to 74 % of the errors on pads of 6 and 12 mm (report truth, part fit). */

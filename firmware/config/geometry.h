@@ -1,8 +1,7 @@
 /* Where the sensors are. The one table of the array's layout; everything else takes it from here.
  *
- * Coordinates in mm in the plane of the pad, origin in its centre, x across the strips, y along
- * them. Sensor k = 5 * strip + position along the strip, as the boards wire them.
- */
+ * Coordinates in mm in the plane of the pad, origin in its centre, x across the strips, y along them. Sensor k = 5 *
+ * strip + position along the strip, as the boards wire them. */
 #pragma once
 
 #include "common/limits.h"

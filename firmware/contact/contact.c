@@ -10,9 +10,8 @@ static bool fewer_bits_than(uint32_t bitmap, int limit) {
   return bits < limit;
 }
 
-/* An uncertain location shows motion as well as any: what gains and model add to it moves with the
- * contact. What the noise adds does not, and beside a doubtful zero a falling force alone moves it.
- */
+/* An uncertain location shows motion as well as any: what gains and model add to it moves with the contact. What the
+ * noise adds does not, and beside a doubtful zero a falling force alone moves it. */
 static bool shows_motion(const struct contact_input *input, uint32_t flags) {
   return (flags & CONTACT_FLAG_FIT_VALID) && (flags & CONTACT_FLAG_UNCERTAINTY_VALID) &&
          !(flags & (CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_ZERO_DOUBTFUL)) &&

@@ -1,5 +1,4 @@
-/* What the fingertip reports about one frame: the flags of the fit, every other flag that applies,
- * and the slip. */
+/* What the fingertip reports about one frame: the flags of the fit, every other flag that applies, and the slip. */
 #pragma once
 
 #include "contact/slip.h"

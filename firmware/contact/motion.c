@@ -8,12 +8,10 @@
 
 #define TICK_SHIFT 6 /* 64 us */
 
-/* Ages of the frames that make a pair, and by how much what the tangential force explains may be wrong over it.
- * Of the brief ones tried, from 20 to 65 ms in all, this finds slides as soon as any; but it includes
- * the lift that came before, for as long as it reaches back. The brisk one does not. Of 312 lifts
- * with a dead travel of 2 mm (seed 211) half of what BRIEF leaves unexplained, or two thirds of
- * FLOOR_um, let one to two pass for slides.
- */
+/* Ages of the frames that make a pair, and by how much what the tangential force explains may be wrong over it. Of the
+ * brief ones tried, from 20 to 65 ms in all, this finds slides as soon as any; but it includes the lift that came
+ * before, for as long as it reaches back. The brisk one does not. Of 312 lifts with a dead travel of 2 mm (seed 211)
+ * half of what BRIEF leaves unexplained, or two thirds of FLOOR_um, let one to two pass for slides. */
 struct pair_spans {
   uint32_t latest_us, gap_end_us, begin_us;
   int32_t unexplained_um;
@@ -96,8 +94,7 @@ static int32_t mean_of(uint32_t to, uint32_t from, int32_t count) { return port_
 
 static int32_t um_from_q11(int32_t mm_q11) { return clamped(mm_q11 * 125 / 256, CHANGE_MAX_um); }
 
-/* Beyond every CHANGE_MAX_um, whatever the scale: a force that vanishes within a frame leaves dQ /
- * F of any size. */
+/* Beyond every CHANGE_MAX_um, whatever the scale: a force that vanishes within a frame leaves dQ / F of any size. */
 #define RATIO_CHANGE_MAX_q12 500000
 
 /* What the tangential force explains. */
@@ -231,8 +228,7 @@ static bool find_velocity(struct motion_history *history) {
   history->motion.vy_mm_s = mm_s_PER_QUOTIENT * (float)vy_q10;
   vx_q10 = clamped(vx_q10, QUOTIENT_MAX);
   vy_q10 = clamped(vy_q10, QUOTIENT_MAX);
-  /* The slope's variance is that of one location times n / spread: um^2 to the quotient's square.
-   */
+  /* The slope's variance is that of one location times n / spread: um^2 to the quotient's square. */
   const uint32_t per_um2 = 4398047u * MOTION_NOISE_SDS * MOTION_NOISE_SDS;
   int32_t least = QUOTIENTS_PER_mm_s * (history->moving ? MOTION_MOVING_ENDS_mm_s : MOTION_MOVING_mm_s);
   uint32_t v2 = (uint32_t)(vx_q10 * vx_q10) + (uint32_t)(vy_q10 * vy_q10);

@@ -39,16 +39,14 @@
 /* MOVING begins and ends. */
 #define MOTION_MOVING_mm_s 8
 #define MOTION_MOVING_ENDS_mm_s 6
-/* Standard deviations that count as motion. One frame of a weak contact in a million exceeds
- * them by noise, all of which may lie along one line. The fixed limits protect other contacts
- * better. */
+/* Standard deviations that count as motion. One frame of a weak contact in a million exceeds them by noise, all of
+ * which may lie along one line. The fixed limits protect other contacts better. */
 #define MOTION_NOISE_SDS 5
 #define MOTION_NOISE_MAX_um 400 /* of one location; noisier ones are ignored */
 
-/* A contact that sticks moves by 2/3 of its dead travel per friction for each unit of Q / F: 1.3 mm
- * at 1 mm and 0.5. At nine tenths of what friction holds it moves twice that. In lifts and slides
- * of the twin, seeds 201 to 213, dead travel 0.2, 1 and 2 mm, values of 6, 8 and 10 gave the same.
- */
+/* A contact that sticks moves by 2/3 of its dead travel per friction for each unit of Q / F: 1.3 mm at 1 mm and 0.5. At
+ * nine tenths of what friction holds it moves twice that. In lifts and slides of the twin, seeds 201 to 213, dead
+ * travel 0.2, 1 and 2 mm, values of 6, 8 and 10 gave the same. */
 #define MOTION_PER_RATIO_mm 8
 /* SLIDING ends after this time without a slide: a caught object rings. */
 #define MOTION_SLIDING_ENDS_us 15000u
@@ -56,8 +54,7 @@
 /* 64 frames span the brief pair at 1280 frames a second; with more the spans get shorter. */
 #define MOTION_ENTRIES 64u
 #define MOTION_SLOW_STEP_us 5000u
-/* Frames nearer to the last that was judged enter, and report what it did: most of the cost is the
- * judging's. */
+/* Frames nearer to the last that was judged enter, and report what it did: most of the cost is the judging's. */
 #define MOTION_JUDGED_us 2000u
 /* After a longer interval between two locations the history is dropped. */
 #define MOTION_PAUSE_us 125000u

@@ -81,8 +81,7 @@ void shapes_estimate(void *job) {
                                     &question->fit, &own->state, &own->result);
     parts--;
     const bool knows = own->progress == FIT_SHAPES_ANSWERED && own->result.shape != FIT_SHAPE_UNDECIDED;
-    /* What is begun is ended with the same readings, so the next one begins only if it ends here.
-     */
+    /* What is begun is ended with the same readings, so the next one begins only if it ends here. */
     goes_on = own->progress == FIT_SHAPES_UNFINISHED ? parts > 0 : parts >= FIT_SHAPES_PARTS && !knows;
   } while (goes_on);
   /* A shape that is none of these is fitted from the beginning again, and stays so until it is known. */

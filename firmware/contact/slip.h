@@ -31,8 +31,7 @@ struct slip_history {
 /* Forgets the past: call when contact is lost or the location cannot be trusted. */
 void slip_reset(struct slip_history *history);
 
-/* Enters a location and gives its distance from the mean of those in the window before it.
- * t_us must increase from call to call; |x_mm|, |y_mm| <= 800. Returns false, with *distance_mm
- * untouched, until the history spans the window. */
+/* Enters a location and gives its distance from the mean of those in the window before it. t_us must increase from call
+ * to call; |x_mm|, |y_mm| <= 800. Returns false, with *distance_mm untouched, until the history spans the window. */
 bool slip_update(struct slip_history *history, uint64_t t_us, float x_mm, float y_mm, uint32_t window_us,
                  float *distance_mm);

@@ -163,10 +163,9 @@ NOINLINE static struct scaled squares_of(int32_t a, int32_t b, int32_t q) {
   return sum_of(scaled_mul(x, x), scaled_mul(y, y));
 }
 
-/* Whether anything pulls, Q14: 2^14 surely. A contact is as likely pulled as not, and what pulls
- * has the standard deviation USUAL along each axis. The estimate's own variance is itself an
- * estimate, of fifteen readings less eight unknowns: so its errors are Student's t of 6 degrees of
- * freedom, in the plane. */
+/* Whether anything pulls, Q14: 2^14 surely. A contact is as likely pulled as not, and what pulls has the standard
+ * deviation USUAL along each axis. The estimate's own variance is itself an estimate, of fifteen readings less eight
+ * unknowns: so its errors are Student's t of 6 degrees of freedom, in the plane. */
 #define USUAL_SQUARE_Q26 671089 /* 0.1^2 */
 #define SURE_SDS 16
 #define RATIO_SD_MIN_Q26 (1 << 16)

@@ -1,6 +1,5 @@
-/* What the fingertip reports about the tangential force of one frame: the estimate of
- * fit_tangential.h in the scales of the pad. Where the pad's edges spoil the zero, it reports only
- * the change since the first touch. */
+/* What the fingertip reports about the tangential force of one frame: the estimate of fit_tangential.h in the scales of
+ * the pad. Where the pad's edges spoil the zero, it reports only the change since the first touch. */
 #pragma once
 
 #include "contact/contact.h"
@@ -50,8 +49,7 @@ struct tangential_force {
   float ratio;      /* |Q| / F */
 };
 
-/* Whether an estimate from this fit is worth its time; saturated: bitmap of the sensors that were
- * left out for it. */
+/* Whether an estimate from this fit is worth its time; saturated: bitmap of the sensors that were left out for it. */
 bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated);
 
 /* The estimate of a contact from frame to frame; of all zeros: of none. */
@@ -97,11 +95,10 @@ void tangential_estimate(void *job);
 /* Forgets the contact. */
 void tangential_reset(struct tangential_history *history);
 
-/* Call after contact_judge or contact_update, with the same input. Adds TANGENTIAL_VALID and
- * TANGENTIAL_FROM_TOUCH to result->flags. With the former, UNCERTAIN is about the corrected
- * location, and ELONGATED about the estimate, which a tangential force does not make look long. Where the pad's
- * edges hide a tangential force such that it shows less than TANGENTIAL_GAIN_MIN of itself, there is
- * none. */
+/* Call after contact_judge or contact_update, with the same input. Adds TANGENTIAL_VALID and TANGENTIAL_FROM_TOUCH to
+ * result->flags. With the former, UNCERTAIN is about the corrected location, and ELONGATED about the estimate, which a
+ * tangential force does not make look long. Where the pad's edges hide a tangential force such that it shows less than
+ * TANGENTIAL_GAIN_MIN of itself, there is none. */
 #define TANGENTIAL_GAIN_MIN 0.25f
 void tangential_update(struct tangential_history *history, const struct tangential_settings *settings,
                        const struct contact_input *input, struct contact_result *result,

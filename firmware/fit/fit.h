@@ -22,27 +22,24 @@
 /* The same gain_sd for every sensor, and model_sd: shares of 1, below 1. */
 void fit_set_errors(struct fit_settings *settings, float gain_sd, float model_sd);
 
-/* FT_ERR_ARGUMENT: sensor_count outside 1..FT_MAX_SENSORS, pitch outside 0.01..10000 mm, or a
- * position outside +-10000 mm. Arrays more than 2^30 / 2^24 .. 2^23 = 64 to 128 pitches off the
- * origin take the general kernel. */
+/* FT_ERR_ARGUMENT: sensor_count outside 1..FT_MAX_SENSORS, pitch outside 0.01..10000 mm, or a position outside +-10000
+ * mm. Arrays more than 2^30 / 2^24 .. 2^23 = 64 to 128 pitches off the origin take the general kernel. */
 enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
                               float pitch_mm);
 
-/* The same for an image that knows its layout. It takes only the rectangle of FIT_GRID_COLUMNS x
- * FIT_GRID_ROWS nodes that the fixed-point kernels are compiled for. Any other is FT_ERR_ARGUMENT
- * too. Use it with fit_gaussian_grid. */
+/* The same for an image that knows its layout. It takes only the rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS nodes
+ * that the fixed-point kernels are compiled for. Any other is FT_ERR_ARGUMENT too. Use it with fit_gaussian_grid. */
 enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
                                    float pitch_mm);
 
-/* A second fit leaves out a sensor whose reading does not belong to the others' (fit_limits.h).
- * SENSOR_MASKED and `used` show it. The fit searches for one only where residuals are rough, and more
- * than noise, gains and model explain.
+/* A second fit leaves out a sensor whose reading does not belong to the others' (fit_limits.h). SENSOR_MASKED and
+ * `used` show it. The fit searches for one only where residuals are rough, and more than noise, gains and model
+ * explain.
  *
  * Widths and ELONGATED need every sensor of the grid.
  *
- * pressure_Pa_q10[sensor]: pressure on the pad, 1/1024 Pa, any bits. usable: bitmap of the sensors
- * to use. With fewer than four (of an array on a line, three), or no positive reading, FIT_VALID
- * stays off. */
+ * pressure_Pa_q10[sensor]: pressure on the pad, 1/1024 Pa, any bits. usable: bitmap of the sensors to use. With fewer
+ * than four (of an array on a line, three), or no positive reading, FIT_VALID stays off. */
 void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                   const struct fit_settings *settings, struct fit_result *result);
 
@@ -69,13 +66,12 @@ float fit_quadrature(float a, float b, float c, float d);
 
 /* The kernels behind fit_gaussian, to compare them.
  *
- * fit_grid: fixed point, for a full rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS nodes (of the
- * build, 2 to 6 each way) with every sensor usable; sigma from 0.216 pitch.
- * fit_grid_masked: the same with any sensors missing, at twice the cost. It also takes a full
- * rectangle whose width, known by the prior, is below FIT_SHAPE_LEAST pitches and has a dip.
- * fit_general: float32, any positions, any sensors missing; leaves an outlier out by itself.
- * The former two return whether they have settled with residuals that look like an outlier: rough,
- * and more than noise, gains and model explain. */
+ * fit_grid: fixed point, for a full rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS nodes (of the build, 2 to 6 each way)
+ * with every sensor usable; sigma from 0.216 pitch. fit_grid_masked: the same with any sensors missing, at twice the
+ * cost. It also takes a full rectangle whose width, known by the prior, is below FIT_SHAPE_LEAST pitches and has a dip.
+ * fit_general: float32, any positions, any sensors missing; leaves an outlier out by itself. The former two return
+ * whether they have settled with residuals that look like an outlier: rough, and more than noise, gains and model
+ * explain. */
 bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
               struct fit_result *result);
 bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,

@@ -1,14 +1,12 @@
 /* What a tangential force that is not estimated does to the location.
  *
- * A tangential force moves the Gaussian by some 0.38 pitch for each unit of Q / F, and leaves a trace in the
- * residual. The look finds how large that trace is, beyond what noise, gains and model leave by
- * chance. That much of a tangential force is part of the location's error (NUMERICS.md, "A tangential force that is not
- * known").
+ * A tangential force moves the Gaussian by some 0.38 pitch for each unit of Q / F, and leaves a trace in the residual.
+ * The look finds how large that trace is, beyond what noise, gains and model leave by chance. That much of a tangential
+ * force is part of the location's error (NUMERICS.md, "A tangential force that is not known").
  *
- * A look is one least squares in fixed point, of the residual of a fit that is done: for every
- * kernel, any layout, any sensors missing. It is in parts, one a frame, for the time after the
- * frame's packet. Until a contact's first look has ended, and where there is none, the tangential force is
- * FIT_DOUBT_USUAL. */
+ * A look is one least squares in fixed point, of the residual of a fit that is done: for every kernel, any layout, any
+ * sensors missing. It is in parts, one a frame, for the time after the frame's packet. Until a contact's first look has
+ * ended, and where there is none, the tangential force is FIT_DOUBT_USUAL. */
 #pragma once
 
 #include "fit/fit.h"

@@ -1,7 +1,6 @@
-/* Fixed-point arithmetic for the fit on a core with a 32 x 32 -> 32 bit multiplier and a 32/32 bit
- * divider. Qn means: the integer is the value times 2^n. Every function is exact to the bit on
- * every machine: it uses nothing but two's complement integers and arithmetic right shifts.
- */
+/* Fixed-point arithmetic for the fit on a core with a 32 x 32 -> 32 bit multiplier and a 32/32 bit divider. Qn means:
+ * the integer is the value times 2^n. Every function is exact to the bit on every machine: it uses nothing but two's
+ * complement integers and arithmetic right shifts. */
 #pragma once
 
 #include "port/divide.h"
@@ -49,8 +48,7 @@ FIXED_INLINE int32_t fixed_mul_q26(int32_t a, int32_t b) {
   return a_high * b_high * 64 + ((a_high * b_low + a_low * b_high) >> 10) + (int32_t)(low >> 26);
 }
 
-/* a * b / 2^28 from three products, with the mean of the fourth in its place: error below 6 units.
- */
+/* a * b / 2^28 from three products, with the mean of the fourth in its place: error below 6 units. */
 FIXED_INLINE int32_t fixed_mul_near_q28(int32_t a, int32_t b) {
   int32_t a_high = a >> 16, a_low = (uint16_t)a;
   int32_t b_high = b >> 16, b_low = (uint16_t)b;
@@ -117,10 +115,9 @@ struct fixed_pivot {
 };
 #define FIXED_PIVOT_LEAST (1 << 18) /* 2^-12 */
 
-/* Takes from the unknowns after j what j explains: L D L^T with a power of two between the factors,
- * of 16 bits each. matrix: the lower half, rows of `words`; column j and right[j] stay as they are.
- * over: the elements of L below j, Q14. What j explains of the square of the residual is
- * own over 2. */
+/* Takes from the unknowns after j what j explains: L D L^T with a power of two between the factors, of 16 bits each.
+ * matrix: the lower half, rows of `words`; column j and right[j] stay as they are. over: the elements of L below j,
+ * Q14. What j explains of the square of the residual is own over 2. */
 FIXED_INLINE struct fixed_pivot fixed_eliminate(int32_t *matrix, int words, int count, int j, int32_t *right,
                                                 int32_t *over) {
   struct fixed_pivot pivot = {0, 0, 0, 0};
@@ -231,8 +228,7 @@ FIXED_INLINE int32_t scaled_to_fixed(struct scaled a, int32_t q) {
   return a.mantissa >> (shift < -31 ? 31 : -shift);
 }
 
-/* Square root of a non-negative value, within 0.06 %: a Newton step from a straight line that is
- * within 3.2 % of it. */
+/* Square root of a non-negative value, within 0.06 %: a Newton step from a straight line that is within 3.2 % of it. */
 FIXED_INLINE struct scaled scaled_sqrt(struct scaled a) {
   a = scaled_from(a.mantissa, a.exponent);
   if (a.mantissa <= 0) {

@@ -48,8 +48,7 @@ struct parameters {
   float p0, x, y, sigma;
 };
 
-/* What cast rubber takes from the Gaussian e: share exp(-(X^2 + Y^2) / (2 sd^2)), of the same
- * amplitude. */
+/* What cast rubber takes from the Gaussian e: share exp(-(X^2 + Y^2) / (2 sd^2)), of the same amplitude. */
 struct dip {
   float share, log2_scale, narrowness; /* log2(e) / (2 sd^2), 1 / sd^2 */
 };
@@ -70,9 +69,8 @@ static float clamp(float value, float low, float high) {
 /* NaN and infinity count as high. */
 static float at_most(float value, float high) { return value < high ? value : high; }
 
-/* In place, matrix = L D L^T: L below the diagonal, D on it. A pivot below its floor is raised to
- * it, which shortens the step in a direction that the readings do not determine. Returns whether
- * that happened. */
+/* In place, matrix = L D L^T: L below the diagonal, D on it. A pivot below its floor is raised to it, which shortens
+ * the step in a direction that the readings do not determine. Returns whether that happened. */
 static bool factorise(struct normal_equations *normal) {
   bool deficient = false;
   for (int i = 0; i < PARAMETERS; i++) {
@@ -177,9 +175,8 @@ static struct parameters guess(const struct samples *samples, int peak) {
   return theta;
 }
 
-/* At X, Y from the centre: the model of amplitude 1 is e - d, with
- * e = exp(-(X^2 + Y^2) / (2 sigma^2)) and d that of the dip. The row is what its derivatives span,
- * e (1, X, Y, X^2 + Y^2) where there is no dip. Returns d. */
+/* At X, Y from the centre: the model of amplitude 1 is e - d, with e = exp(-(X^2 + Y^2) / (2 sigma^2)) and d that of
+ * the dip. The row is what its derivatives span, e (1, X, Y, X^2 + Y^2) where there is no dip. Returns d. */
 static float model_row(const struct dip *dip, float sigma, float x, float y, float row[PARAMETERS]) {
   float r2 = x * x + y * y, sigma2 = sigma * sigma;
   float e = fit_exp2_negative(r2 * (0.5f * LOG2_E / sigma2));

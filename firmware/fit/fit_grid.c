@@ -164,8 +164,7 @@ static NOINLINE int32_t project_on_model(const struct moments *m, const int32_t 
   return product;
 }
 
-/* What the model leaves of the readings, rounded so that its sum has RESIDUAL_SUM_BITS; returns the
- * shift. */
+/* What the model leaves of the readings, rounded so that its sum has RESIDUAL_SUM_BITS; returns the shift. */
 static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_q28, struct readings *readings) {
   const struct factor *y = &m->y;
   const int32_t *p = readings->q28;
@@ -464,8 +463,7 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const stru
   fit_grid_end_spread(settings, system, spread);
 }
 
-/* The flags of the shape that apply. If it is elongated, separate widths would move the location.
- */
+/* The flags of the shape that apply. If it is elongated, separate widths would move the location. */
 static NOINLINE uint32_t judge_shape(const struct readings *readings, const struct fit_settings *settings,
                                      const struct fit_system *system, const struct shape *shape,
                                      struct fit_spread *spread) {

@@ -1,9 +1,8 @@
-/* The grid fit without some of its sensors, where the polynomials of fit_grid.c are not orthogonal. The
- * columns are formed at the sensors that are there, relative to the strongest of those, and made
- * orthogonal over them: each is the model times a polynomial, a part along x plus one along y, whose
- * coefficients come from the iteration before and are nearly right already; an L D L^T of three
- * columns takes out what is left and mends the coefficients for the next. Where the fit ends is
- * decided by the residual against columns of 15 bits, as in fit_grid.c. */
+/* The grid fit without some of its sensors, where the polynomials of fit_grid.c are not orthogonal. The columns are
+ * formed at the sensors that are there, relative to the strongest of those, and made orthogonal over them: each is the
+ * model times a polynomial, a part along x plus one along y, whose coefficients come from the iteration before and are
+ * nearly right already; an L D L^T of three columns takes out what is left and mends the coefficients for the next.
+ * Where the fit ends is decided by the residual against columns of 15 bits, as in fit_grid.c. */
 #include "common/contact_flags.h"
 #include "fit/fit_grid_solve.h"
 #include "fit/fit_limits.h"
@@ -17,10 +16,9 @@
 #define UNROLL_BY(n) PRAGMA(GCC unroll n)
 #define UNROLL UNROLL_BY(5)
 
-/* Polynomials over the nodes are sums of a part along x and one along y. Those of degree one are in
- * LINEAR_Q, |.| < 2^30, that of degree two in SQUARE_Q, |.| < 2^31. Their coefficients are held to
- * what a press can ask for, and used with 12 bits after the point: what that leaves to be
- * orthogonal is dealt with as the rest is. */
+/* Polynomials over the nodes are sums of a part along x and one along y. Those of degree one are in LINEAR_Q, |.| <
+ * 2^30, that of degree two in SQUARE_Q, |.| < 2^31. Their coefficients are held to what a press can ask for, and used
+ * with 12 bits after the point: what that leaves to be orthogonal is dealt with as the rest is. */
 #define LINEAR_Q (COLUMNS > 5 || ROWS > 5 ? 24 : 25)
 #define LINEAR_ONE (1 << LINEAR_Q)
 #define LINEAR_TO_Q26 (1 << (26 - LINEAR_Q))

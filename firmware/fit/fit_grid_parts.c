@@ -161,8 +161,7 @@ void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressur
 #define OWN_SHARE_MAX_Q15 ((int32_t)(FIT_OWN_SHARE_MAX * 32768.0f))
 #define OWN_FAR_Q11 (7 << 11) /* what it makes is at its limit before, or nothing */
 
-/* Of the nodes along an axis: the Gaussian's factor, and from the contact x / sigma^2 per pitch and
- * x^2 / sigma^2. */
+/* Of the nodes along an axis: the Gaussian's factor, and from the contact x / sigma^2 per pitch and x^2 / sigma^2. */
 struct own_axis {
   int32_t bell_q30[MOST_ALONG], slope_q11[MOST_ALONG], square_q11[MOST_ALONG];
 };

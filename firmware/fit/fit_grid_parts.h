@@ -1,6 +1,5 @@
-/* Inside the fixed-point kernels alone: what they share. Pitches are the unit of length, readings
- * have the grid's order [column][row], node numbers count from node (COLUMNS / 2, ROWS / 2).
- */
+/* Inside the fixed-point kernels alone: what they share. Pitches are the unit of length, readings have the grid's order
+ * [column][row], node numbers count from node (COLUMNS / 2, ROWS / 2). */
 #pragma once
 
 #include "fit/fit.h"
@@ -133,9 +132,8 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
 struct dip {
   int32_t x[MOST_COLUMNS], y[MOST_ROWS];
 };
-/* Sets the factors about this contact, whose model is amplitude 2^rise at the centre, and returns
- * the dip's depth there, at most most_q28. height: of the dip's Gaussian, Q26; share: its depth, of
- * the contact's. */
+/* Sets the factors about this contact, whose model is amplitude 2^rise at the centre, and returns the dip's depth
+ * there, at most most_q28. height: of the dip's Gaussian, Q26; share: its depth, of the contact's. */
 int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at, int32_t amplitude_q28,
                      int32_t rise_q22, int32_t most_q28, struct dip *dip);
 
@@ -146,8 +144,7 @@ void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressur
 /* The model at the centre, where it is amplitude 2^rise: at most most_q28. */
 int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled share, int32_t most_q28);
 
-/* Corrects the readings of the usable sensors by what is their own (fit_settings), about a contact
- * of this peak. */
+/* Corrects the readings of the usable sensors by what is their own (fit_settings), about a contact of this peak. */
 #define FIT_OWN_PEAK_MAX_Q28 (1 << 30)
 void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, uint32_t usable,
                            const struct state *at, int32_t peak_q28, struct readings *readings);

@@ -212,8 +212,7 @@ static NOINLINE struct scaled location_form(const struct fit_system *system, con
   return form;
 }
 
-/* Variance of one reading that is the same for all of them, in units of Q28, and what the residuals
- * show besides. */
+/* Variance of one reading that is the same for all of them, in units of Q28, and what the residuals show besides. */
 struct scatter {
   struct scaled noise; /* the noise's alone */
   struct scaled all;   /* and the model's, and what the residuals are above these and the gains' */

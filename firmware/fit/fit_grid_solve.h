@@ -1,7 +1,5 @@
-/* Inside the fixed-point kernels alone: the normal equations of one iteration, the step they ask
- * for, and what the last of them imply for the result. How a kernel comes by them is its own
- * affair.
- */
+/* Inside the fixed-point kernels alone: the normal equations of one iteration, the step they ask for, and what the last
+ * of them imply for the result. How a kernel comes by them is its own affair. */
 #pragma once
 
 #include "fit/fit_grid_parts.h"
@@ -62,8 +60,7 @@ FIXED_INLINE int32_t fit_grid_rise(int32_t height, int32_t offset_x, int32_t off
   return fixed_mul_q32(height, fixed_clamp(squares, 0, (1 << 29) - 1) * 2) * 2;
 }
 
-/* The prior (sigma - prior) / width as one more row of the least squares; c3 is the only unknown
- * that changes sigma. */
+/* The prior (sigma - prior) / width as one more row of the least squares; c3 is the only unknown that changes sigma. */
 void fit_grid_add_prior(const struct readings *readings, struct fit_system *system);
 
 /* Sets the stiffness and adds the prior, if there is one, to what the kernel filled in. */
@@ -95,9 +92,8 @@ struct fit_columns_q {
 };
 
 struct fit_spread {
-  /* How far one unit of a column moves x and y (pitches, times 2^(location_exponent - 15)) and the
-   * force (its share times sigma^2, times 2^(force_exponent - 15)), if the readings' unit is that
-   * of Q28. */
+  /* How far one unit of a column moves x and y (pitches, times 2^(location_exponent - 15)) and the force (its share
+   * times sigma^2, times 2^(force_exponent - 15)), if the readings' unit is that of Q28. */
   int32_t x1, x2, x3, y2, y3, location_exponent;
   int32_t f0, f1, f2, f3, force_exponent;
   struct scaled inverse_mass, inverse1, inverse2, inverse3; /* of the norms, of all four columns */
@@ -136,8 +132,7 @@ void fit_grid_set_errors(const struct fit_grid_shape *grid, const struct fit_set
 /* By how much a unit of each reading moves something, 15 bits, in q28: adds what the errors do. */
 void fit_grid_add_moves(const struct readings *room, uint32_t *by_gains, int32_t *by_shape);
 
-/* Values of up to 15 bits in one unit, the largest of 13 bits. Returns the exponent of that unit.
- */
+/* Values of up to 15 bits in one unit, the largest of 13 bits. Returns the exponent of that unit. */
 int32_t fit_grid_align(const struct scaled *values, int count, int32_t *aligned);
 
 /* The result from the last system, what it makes of the errors of the readings, and the state after

@@ -8,9 +8,8 @@
 /* Columns times these stay within 31 bits with four of them. */
 #define COEFFICIENT_BITS 13
 
-/* z^2 e of a sensor in Q21, z = -log2 of the model there, in Q10 and at most 22.6. Where the
- * contact lies among the sensors it is at most 1.2, with room for an e that is up to four times
- * what it is called. */
+/* z^2 e of a sensor in Q21, z = -log2 of the model there, in Q10 and at most 22.6. Where the contact lies among the
+ * sensors it is at most 1.2, with room for an e that is up to four times what it is called. */
 #define DOWN_MAX_Q10 23170
 #define SHAPE_USUAL_Q21 (10 << 21)
 

@@ -1,5 +1,4 @@
-/* The errors that a result reports, and when it deserves a warning. They are alike in all kernels.
- */
+/* The errors that a result reports, and when it deserves a warning. They are alike in all kernels. */
 #pragma once
 
 #include "common/bytes.h"
@@ -49,14 +48,13 @@
 #define FIT_SHAPE_KNOWN 0.3f
 #define FIT_BOUND_SD 1.2f /* pitches: such presses of a thin pad are off by up to 2.4 */
 
-/* A contact is elongated if log(longer width / shorter) exceeds FIT_STRETCH_LEAST, below which the
- * cubes and spheres of a layer stay, and FIT_STRETCH_SURE standard deviations of the part from noise
- * and gains, added in quadrature; where the dip is known, also a tail that is off by FIT_TAIL_ERROR
- * of the peak, as wide as the dip. Widths are reported up to a standard deviation of
- * FIT_STRETCH_SD_MAX and a ratio of exp(FIT_STRETCH_MAX), and from a sigma of FIT_SHAPE_LEAST
- * pitches, below which the layer's own profile appears elongated. If it is elongated, the location's
- * standard deviation contains the shift by separate widths, beyond a stretch of FIT_STRETCH_LINEAR
- * only the share of it that falls with the square of the stretch. */
+/* A contact is elongated if log(longer width / shorter) exceeds FIT_STRETCH_LEAST, below which the cubes and spheres of
+ * a layer stay, and FIT_STRETCH_SURE standard deviations of the part from noise and gains, added in quadrature; where
+ * the dip is known, also a tail that is off by FIT_TAIL_ERROR of the peak, as wide as the dip. Widths are reported up
+ * to a standard deviation of FIT_STRETCH_SD_MAX and a ratio of exp(FIT_STRETCH_MAX), and from a sigma of
+ * FIT_SHAPE_LEAST pitches, below which the layer's own profile appears elongated. If it is elongated, the location's
+ * standard deviation contains the shift by separate widths, beyond a stretch of FIT_STRETCH_LINEAR only the share of it
+ * that falls with the square of the stretch. */
 #define FIT_STRETCH_LEAST 0.1f
 #define FIT_TAIL_ERROR 0.015f
 #define FIT_STRETCH_SURE 2.5f
@@ -98,8 +96,7 @@ static inline bool fit_has_dip(const struct fit_settings *settings) {
          bytes_from_f32(settings->dip_share) - 1u < bytes_from_f32(FIT_DIP_SHARE_MAX);
 }
 
-/* With so few iterations that the contact is not known before the last of them, the readings stay.
- */
+/* With so few iterations that the contact is not known before the last of them, the readings stay. */
 static inline bool fit_has_own(const struct fit_settings *settings) {
   return settings->own && settings->iterations > FIT_OWN_ITERATIONS;
 }
@@ -129,9 +126,8 @@ static inline int32_t fit_reading(const struct fit_settings *settings, int32_t p
   return pressure_Pa_q10 < -noise * settings->cut_noises ? 0 : pressure_Pa_q10;
 }
 
-/* Whether the fit without an outlier is the better one. rough: its residuals still are. An outlier
- * above the others takes the place of a narrow press, and makes others outliers. Then either fit
- * may be the right one. */
+/* Whether the fit without an outlier is the better one. rough: its residuals still are. An outlier above the others
+ * takes the place of a narrow press, and makes others outliers. Then either fit may be the right one. */
 static inline bool fit_outlier_gone(const struct fit_settings *settings, const struct fit_result *with,
                                     struct fit_result *without, bool rough, float pitch_mm) {
   if (!(without->flags & CONTACT_FLAG_FIT_VALID) ||

@@ -1,6 +1,5 @@
-/* Exponential and logarithm to base 2 in integers: five to ten times faster than the C library's
- * on a core without FPU, and the same bits on every machine.
- */
+/* Exponential and logarithm to base 2 in integers: five to ten times faster than the C library's on a core without FPU,
+ * and the same bits on every machine. */
 #pragma once
 
 #include <stdint.h>

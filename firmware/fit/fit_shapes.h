@@ -28,8 +28,7 @@
 /* With fewer sensors there are hardly more readings than unknowns. */
 #define FIT_SHAPES_SENSORS 12
 
-/* A frame is done in this number of parts, a model each, for a processor that has other work between
- * them. */
+/* A frame is done in this number of parts, a model each, for a processor that has other work between them. */
 #define FIT_SHAPES_PARTS 3
 
 #define FIT_SHAPES_FRAMES 23
@@ -130,8 +129,7 @@ bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad, const
                 const struct fit_settings *settings, const struct fit_result *fit, struct fit_shapes_state *state,
                 struct fit_shapes_result *result);
 
-/* The same in parts: call it with the same pad, readings, fit and settings until the frame is done.
- */
+/* The same in parts: call it with the same pad, readings, fit and settings until the frame is done. */
 enum fit_shapes_progress {
   FIT_SHAPES_UNFINISHED,
   FIT_SHAPES_STEPPED,  /* the frame is done, and the result of one before remains */

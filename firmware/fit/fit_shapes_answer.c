@@ -184,9 +184,8 @@ static void put_middle(int model, const int32_t *at, int32_t middle_q20[2]) {
   middle_q20[1] = at[PLACE_Y] + fixed_mul_16(at[SPAN_Y], balance_q14) * 4;
 }
 
-/* The other models may be right: how far their middles are, by how likely they are, adds to the
- * errors of the places. Where chi^2 is above FIT_SHAPES_ERRORS none of the models may be, and the
- * errors grow with it. */
+/* The other models may be right: how far their middles are, by how likely they are, adds to the errors of the places.
+ * Where chi^2 is above FIT_SHAPES_ERRORS none of the models may be, and the errors grow with it. */
 static void doubt_places(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
                          const struct fit_shapes_state *state, struct fit_shapes_result *result) {
   float total = 1.0f, square_mm2[2] = {0.0f, 0.0f};

@@ -1,5 +1,4 @@
-/* The rows of the least squares of a model: what it is off by at each sensor, and its derivatives.
- */
+/* The rows of the least squares of a model: what it is off by at each sensor, and its derivatives. */
 #include "fit/fit_limits.h"
 #include "fit/fit_math.h"
 #include "fit/fit_shapes_parts.h"

@@ -80,9 +80,8 @@ static inline int32_t fit_shapes_span_square(const int32_t *at) {
 void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, int part,
                       struct fit_shapes_state *state);
 
-/* fit_shapes_step.c. The column of the residuals, and the sum of the squares with those of the
- * priors; chi^2 of both, Q8; and after these, of the model's rows, one damped step, or the factors
- * of the matrix that answers. */
+/* fit_shapes_step.c. The column of the residuals, and the sum of the squares with those of the priors; chi^2 of both,
+ * Q8; and after these, of the model's rows, one damped step, or the factors of the matrix that answers. */
 void fit_shapes_form_residuals(struct fit_shapes_pad *pad, const int32_t *at, struct priors *priors,
                                struct fit_shapes_equations *equations);
 int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations);

@@ -1,21 +1,20 @@
-/* Tangential force from the normal pressures. A pull along the rubber presses the base ahead of it
- * and relieves it behind. This pattern is broader than that of a shifted contact.
+/* Tangential force from the normal pressures. A pull along the rubber presses the base ahead of it and relieves it
+ * behind. This pattern is broader than that of a shifted contact.
  *
- * Eight unknowns: normal force, location, the contact's own spread and its two elongations, and the
- * tangential force along x and y. Each frame takes one Gauss-Newton step: in a contact's first frame
- * from the Gaussian fit, later from where the previous frame ended, moved as the Gaussian has moved
- * and scaled by its force. An estimate after a long step is not reported. After some frames without
- * a report the estimate starts from the Gaussian again.
+ * Eight unknowns: normal force, location, the contact's own spread and its two elongations, and the tangential force
+ * along x and y. Each frame takes one Gauss-Newton step: in a contact's first frame from the Gaussian fit, later from
+ * where the previous frame ended, moved as the Gaussian has moved and scaled by its force. An estimate after a long
+ * step is not reported. After some frames without a report the estimate starts from the Gaussian again.
  *
- * The pad's profile (common/pad_profile.h) describes how its rubber spreads a press and a pull; the
- * dip that a calibration has found (fit_settings) is in the model too, as a term that takes. A
- * prior holds elongation near round. Readings count by their noise, gain error and model error. Fixed point, the same
- * bits on every machine, any sensors missing. NUMERICS.md has the derivation, the conditioning and the limits.
+ * The pad's profile (common/pad_profile.h) describes how its rubber spreads a press and a pull; the dip that a
+ * calibration has found (fit_settings) is in the model too, as a term that takes. A prior holds elongation near round.
+ * Readings count by their noise, gain error and model error. Fixed point, the same bits on every machine, any sensors
+ * missing. NUMERICS.md has the derivation, the conditioning and the limits.
  *
  * At most 43 100 cycles a frame on a Cortex-M0+ (test emulated.fit_cycles).
  *
- * The layers are infinite and exactly known. The effect of a pad that ends is subtracted afterwards
- * (pad_profile.h, pad_edges). No measurement on a real pad confirms it yet. */
+ * The layers are infinite and exactly known. The effect of a pad that ends is subtracted afterwards (pad_profile.h,
+ * pad_edges). No measurement on a real pad confirms it yet. */
 #pragma once
 
 #include "common/pad_profile.h"
@@ -102,11 +101,10 @@ struct fit_tangential {
 /* A contact at rest is at its optimum after this number of frames. */
 #define FIT_TANGENTIAL_FRAMES 5
 
-/* fit: of the same readings. `valid` stays off without FIT_VALID, with fewer than
- * FIT_TANGENTIAL_SENSORS in use, at the first step and after a long one, and where a parameter ends
- * at its limit. It also stays off where the contact is clearly longer than wide, or the readings
- * are not those of one contact on this pad (NUMERICS.md has the limits, and how they widen where
- * the pad ends near), and where q_sd_N exceeds FIT_TANGENTIAL_SD_MAX of the force. */
+/* fit: of the same readings. `valid` stays off without FIT_VALID, with fewer than FIT_TANGENTIAL_SENSORS in use, at the
+ * first step and after a long one, and where a parameter ends at its limit. It also stays off where the contact is
+ * clearly longer than wide, or the readings are not those of one contact on this pad (NUMERICS.md has the limits, and
+ * how they widen where the pad ends near), and where q_sd_N exceeds FIT_TANGENTIAL_SD_MAX of the force. */
 #define FIT_TANGENTIAL_SENSORS 8
 #define FIT_TANGENTIAL_SD_MAX 0.2f
 void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,

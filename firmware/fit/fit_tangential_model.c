@@ -11,8 +11,7 @@ struct origin {
   int32_t x_q12, y_q12, amplitude_q13, pull_x_q13, pull_y_q13, e1_q17, e2_q17;
 };
 
-/* Of a contact there: where the sensors lie along one axis, and what of the model depends on that
- * alone. */
+/* Of a contact there: where the sensors lie along one axis, and what of the model depends on that alone. */
 struct offset {
   int32_t d_q12, half_square_q24;
   int32_t pulled_q25;               /* B d */
@@ -109,8 +108,7 @@ NOINLINE static void set_terms(const struct problem *problem, const struct term 
   }
 }
 
-/* struct fit_tangential_sums of every node, of its terms. What is multiplied by little has few
- * bits. */
+/* struct fit_tangential_sums of every node, of its terms. What is multiplied by little has few bits. */
 NOINLINE static void set_sums(const struct term *terms, union fit_tangential_node *node) {
   const union fit_tangential_node *end = node + NODES;
   do {
@@ -218,9 +216,8 @@ NOINLINE static void set_moving(const struct offset *x, const struct offset *y, 
   } while (++node != end);
 }
 
-/* Takes from the residuals what is the sensors' own. A sensor that is off by o and responds wider
- * by b reads what the model has at d + o - b d, so that the columns of the place give how much more
- * it is. */
+/* Takes from the residuals what is the sensors' own. A sensor that is off by o and responds wider by b reads what the
+ * model has at d + o - b d, so that the columns of the place give how much more it is. */
 NOINLINE static void take_own(const struct problem *problem, const struct offset *x, const struct offset *y,
                               struct fit_tangential_room *room) {
   const int32_t pitch_q12 = problem->pad->pitch_q26 >> (26 - PLACE_Q);

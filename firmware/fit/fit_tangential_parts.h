@@ -23,9 +23,8 @@ enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKN
 #define AMPLITUDE_MAX_Q24 ((4 << 24) - (1 << 11))
 #define PULL_MAX_Q24 (2 << 24)
 
-/* Where a step begins is rounded, which moves the step and not where it ends: so that what residual
- * and Jacobian have of it is exact in 16 bits, distances from sensors too, whose pitch is such a
- * number. */
+/* Where a step begins is rounded, which moves the step and not where it ends: so that what residual and Jacobian have
+ * of it is exact in 16 bits, distances from sensors too, whose pitch is such a number. */
 #define PLACE_Q 12
 #define HEIGHT_Q 13 /* of A and B */
 #define LONG_Q 17   /* of e1 and e2 */
@@ -45,10 +44,9 @@ struct problem {
   int32_t spread_prior_q26, long_prior_q26;
 };
 
-/* One step's normal equations, solved. L D L^T in place, with a power of two for each pivot between
- * the factors, 2^half about 1 / sqrt(pivot), so that both have all of their 16 bits: below the
- * diagonal L / 2^half, Q14; above it D L 2^half, Q15. A direction whose pivot is below PIVOT_LEAST
- * takes no step. */
+/* One step's normal equations, solved. L D L^T in place, with a power of two for each pivot between the factors, 2^half
+ * about 1 / sqrt(pivot), so that both have all of their 16 bits: below the diagonal L / 2^half, Q14; above it D L
+ * 2^half, Q15. A direction whose pivot is below PIVOT_LEAST takes no step. */
 struct solution {
   int32_t step_q20[UNKNOWNS]; /* of the normalised columns */
   int32_t half[UNKNOWNS];

@@ -100,11 +100,10 @@ struct fit_result {
                                    UNCERTAIN, MODEL, AT_BOUND, SENSOR_MASKED, WIDTHS_VALID, ELONGATED */
 };
 
-/* What frames that follow each other keep of the search for an outlier, for FIT_WATCH_FRAMES frames
- * of the same sensors: an outlier is left out at once, and where there was none, none is searched
- * for. Before, only residuals that have grown by half of what they were, relative to the force,
- * begin another search, and not in the first FIT_WATCH_LEAST frames (NUMERICS.md, "Outliers"). All
- * zeros: nothing found yet. */
+/* What frames that follow each other keep of the search for an outlier, for FIT_WATCH_FRAMES frames of the same
+ * sensors: an outlier is left out at once, and where there was none, none is searched for. Before, only residuals that
+ * have grown by half of what they were, relative to the force, begin another search, and not in the first
+ * FIT_WATCH_LEAST frames (NUMERICS.md, "Outliers"). All zeros: nothing found yet. */
 #define FIT_WATCH_FRAMES 128
 #define FIT_WATCH_LEAST 8
 struct fit_watch {

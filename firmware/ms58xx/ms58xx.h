@@ -1,8 +1,7 @@
-/* TE Connectivity's MS58xx family, of which the build chooses one (sensors.h): commands, calibration
- * PROM and compensation. Pure functions: no bus, no time, no state but what the caller owns.
+/* TE Connectivity's MS58xx family, of which the build chooses one (sensors.h): commands, calibration PROM and
+ * compensation. Pure functions: no bus, no time, no state but what the caller owns.
  *
- * Sources: the data sheets that sensors.h names; Application Note AN520 for the CRC-4.
- */
+ * Sources: the data sheets that sensors.h names; Application Note AN520 for the CRC-4. */
 #pragma once
 
 #include "common/status.h"

@@ -28,11 +28,10 @@
 #define MS58XX_MS5837_30BA 2
 
 #if MS58XX_SENSOR == MS58XX_MS5840
-/* MS5840-02BA data sheet: conversion times, noise, compensation. The first order was checked with
- * the worked example of the MS5837-02BA data sheet, page 7. The extended range ends at 2 bar.
- * Beyond it a reading is biased low. Readings count as beyond it from 1 % before, so that a part
- * whose readings end right there does not pass by its noise. 8 kPa: a code with bit 18 wrong is 11
- * kPa off. */
+/* MS5840-02BA data sheet: conversion times, noise, compensation. The first order was checked with the worked example of
+ * the MS5837-02BA data sheet, page 7. The extended range ends at 2 bar. Beyond it a reading is biased low. Readings
+ * count as beyond it from 1 % before, so that a part whose readings end right there does not pass by its noise. 8 kPa:
+ * a code with bit 18 wrong is 11 kPa off. */
 #define MS58XX_MAX_PRESSURE_Pa 198000
 #define MS58XX_APART_Pa 1000 /* recalled: a part is off by up to 4 mbar */
 #define MS58XX_STEP_Pa 8192

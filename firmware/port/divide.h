@@ -1,7 +1,5 @@
-/* Integer division with whatever the core has for it. For the main context and the worker's
- * only (worker/worker.h): a divider that is a peripheral, as the RP2040's, one for each processor, is
- * not saved by interrupts.
- */
+/* Integer division with whatever the core has for it. For the main context and the worker's only (worker/worker.h): a
+ * divider that is a peripheral, as the RP2040's, one for each processor, is not saved by interrupts. */
 #pragma once
 
 #ifdef PORT_DIVIDE_HEADER

@@ -1,12 +1,9 @@
-/* The seam between the store and the flash that keeps it, which the board provides at link time: a
- * few sectors of NOR flash that no image reaches. Erasing makes all bits of a sector 1, programming
- * makes some of them 0.
+/* The seam between the store and the flash that keeps it, which the board provides at link time: a few sectors of NOR
+ * flash that no image reaches. Erasing makes all bits of a sector 1, programming makes some of them 0.
  *
- * Nothing here waits: one operation at a time is begun, and port_flash_poll() takes it a step
- * further. No call takes longer than a few microseconds. Power lost in the middle leaves the bits
- * that were to change undefined, and such that they need not read the same twice. Main context
- * only.
- */
+ * Nothing here waits: one operation at a time is begun, and port_flash_poll() takes it a step further. No call takes
+ * longer than a few microseconds. Power lost in the middle leaves the bits that were to change undefined, and such that
+ * they need not read the same twice. Main context only. */
 #pragma once
 
 #include <stdbool.h>

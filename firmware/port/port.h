@@ -1,6 +1,5 @@
-/* What exists exactly once per image and that the board provides at link time: time, the event
- * interrupt, sleep, watchdog, identity, and the way out to the boot loader.
- */
+/* What exists exactly once per image and that the board provides at link time: time, the event interrupt, sleep,
+ * watchdog, identity, and the way out to the boot loader. */
 #pragma once
 
 #include "common/crash.h"
@@ -28,15 +27,13 @@ void port_sleep(void);
  * which takes 0.1 ms. Main context only; no effect if it is so already. */
 void port_save_power(bool saving);
 
-/* Must be called at least once each PORT_WATCHDOG_PERIOD_us from the main loop, else the chip is
- * reset. It counts only while every part that is watched is alive. Costs some 60 Cortex-M0+ cycles.
- */
+/* Must be called at least once each PORT_WATCHDOG_PERIOD_us from the main loop, else the chip is reset. It counts only
+ * while every part that is watched is alive. Costs some 60 Cortex-M0+ cycles. */
 #define PORT_WATCHDOG_PERIOD_us 500000u
 void port_watchdog_feed(void);
 
-/* A part has made progress, or waits for what is sure to come. From its first call on it is
- * watched, and must be alive again each PORT_PART_LIMIT_us. Its own context. Costs some 20 cycles.
- */
+/* A part has made progress, or waits for what is sure to come. From its first call on it is watched, and must be alive
+ * again each PORT_PART_LIMIT_us. Its own context. Costs some 20 cycles. */
 enum port_part { PORT_PART_SCAN, PORT_PART_USB, PORT_PARTS };
 #define PORT_PART_LIMIT_us 400000u
 void port_alive(enum port_part part);

@@ -1,6 +1,5 @@
-/* The pin by which a fingertip shares its clock with cameras and other fingertips. Provided by the
- * board at link time, in images with capability sync. Main context, unless stated otherwise.
- */
+/* The pin by which a fingertip shares its clock with cameras and other fingertips. Provided by the board at link time,
+ * in images with capability sync. Main context, unless stated otherwise. */
 #pragma once
 
 #include <stdbool.h>

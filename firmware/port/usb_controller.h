@@ -1,14 +1,12 @@
-/* The seam between a USB device and the controller that the board provides at link time: a
- * full-speed device controller with the control endpoint and a few others of 64 bytes at most.
+/* The seam between a USB device and the controller that the board provides at link time: a full-speed device controller
+ * with the control endpoint and a few others of 64 bytes at most.
  *
- * An endpoint is named by its address: number, and bit 7 for IN (device to host). Each holds at
- * most one packet. The controller owns the data toggles: a SETUP sets endpoint 0 to DATA1, and
- * opening or unstalling another endpoint sets it to DATA0; each acknowledged packet turns it.
+ * An endpoint is named by its address: number, and bit 7 for IN (device to host). Each holds at most one packet. The
+ * controller owns the data toggles: a SETUP sets endpoint 0 to DATA1, and opening or unstalling another endpoint sets
+ * it to DATA0; each acknowledged packet turns it.
  *
- * usb_controller_start() and usb_controller_request_service() belong to the main context. All other
- * functions are called from the usb_device_on_ functions only, which the controller calls in
- * interrupt context, one at a time.
- */
+ * usb_controller_start() and usb_controller_request_service() belong to the main context. All other functions are
+ * called from the usb_device_on_ functions only, which the controller calls in interrupt context, one at a time. */
 #pragma once
 
 #include <stdbool.h>

@@ -21,11 +21,10 @@
 #define RECOVERY_DELAY_MAX_us 1000000u
 /* Transitions in one call: enough for the longest run of states that take no time. */
 #define MAX_TRANSITIONS 8
-/* A sensor that loses count of the clocks finds its byte not acknowledged and sends no more: what
- * follows reads as ones. All of it does when a sensor missed the command to read, or is far beyond
- * its range; then it is the same again. One code in 65536 ends in sixteen of them by chance, and
- * counts if it is near the sensor's last one, as a torn one hardly is; and one frame of fifteen
- * sensors in three million has four that end in eight. */
+/* A sensor that loses count of the clocks finds its byte not acknowledged and sends no more: what follows reads as
+ * ones. All of it does when a sensor missed the command to read, or is far beyond its range; then it is the same again.
+ * One code in 65536 ends in sixteen of them by chance, and counts if it is near the sensor's last one, as a torn one
+ * hardly is; and one frame of fifteen sensors in three million has four that end in eight. */
 #define TORN_MASK 0xFFFFu
 #define TORN_TOLERANCE 1024u /* some 45 Pa; two readings at OSR 256 differ by 16 Pa rms */
 #define TORN_BYTE 0xFFu
@@ -488,8 +487,7 @@ uint64_t scan_step(struct scan *scan, uint64_t now_us) {
     end_operation(scan, now_us);
     count(&scan->counters.bus_nacks, scan->result.nacks);
     if (was_prom && scan->state != SCAN_READ_PROM) {
-      /* Judging the PROMs takes longer than a transfer: the next operation's deadlines must count
-       * from a fresh time. */
+      /* Judging the PROMs takes longer than a transfer: the next operation's deadlines must count from a fresh time. */
       break;
     }
   }

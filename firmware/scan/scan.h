@@ -1,33 +1,29 @@
-/* Drives the array: brings the sensors up, decides when to convert, wait and read, notices
- * failures, and hands over frames.
+/* Drives the array: brings the sensors up, decides when to convert, wait and read, notices failures, and hands over
+ * frames.
  *
- * Two contexts meet here. scan_step runs in the event context (interrupt) and only moves bytes. The
- * next conversion begins as soon as the last one was read, before its codes are evaluated. So
- * sensors, bus and processor work at the same time, and the frame clock depends on none of the
- * others. scan_take runs in the main context and does the arithmetic. Between them is one slot
- * that holds the newest frame. A processor that falls behind takes the frames it can. Overwritten
- * frames are counted.
+ * Two contexts meet here. scan_step runs in the event context (interrupt) and only moves bytes. The next conversion
+ * begins as soon as the last one was read, before its codes are evaluated. So sensors, bus and processor work at the
+ * same time, and the frame clock depends on none of the others. scan_take runs in the main context and does the
+ * arithmetic. Between them is one slot that holds the newest frame. A processor that falls behind takes the frames it
+ * can. Overwritten frames are counted.
  *
- * Only admitted sensors yield valid readings: see bring_up.h. Where a sensor does not acknowledge,
- * that reading is missing. The next one is missing too unless it is certain that the sensor heard
- * its command, since it might be an old one. The third in a row costs the admission. So does a
- * reading of 0 (no conversion had finished) from a sensor that had acknowledged the command. Where
- * a branch acknowledges as one, the reading after a 0 is void too, and two in a row cost the
- * admission. A reading whose last sixteen bits are ones, far from the sensor's last one, comes from
- * a sensor that lost count of the clocks and stopped sending: see scan.c. readings.h has the other
- * reasons that make a reading or a sensor implausible.
+ * Only admitted sensors yield valid readings: see bring_up.h. Where a sensor does not acknowledge, that reading is
+ * missing. The next one is missing too unless it is certain that the sensor heard its command, since it might be an old
+ * one. The third in a row costs the admission. So does a reading of 0 (no conversion had finished) from a sensor that
+ * had acknowledged the command. Where a branch acknowledges as one, the reading after a 0 is void too, and two in a row
+ * cost the admission. A reading whose last sixteen bits are ones, far from the sensor's last one, comes from a sensor
+ * that lost count of the clocks and stopped sending: see scan.c. readings.h has the other reasons that make a reading
+ * or a sensor implausible.
  *
- * Scattered NACKs of single reads leave 0.4, 1.0, 2.8, 10 and 28 % of 186 frames a second
- * incomplete at 0.3, 1, 3, 10 and 30 of them a second. That is on a simulated bus that acknowledges
- * commands as one. It is half as much where each sensor answers for itself, and none where the bus
- * asks again.
+ * Scattered NACKs of single reads leave 0.4, 1.0, 2.8, 10 and 28 % of 186 frames a second incomplete at 0.3, 1, 3, 10
+ * and 30 of them a second. That is on a simulated bus that acknowledges commands as one. It is half as much where each
+ * sensor answers for itself, and none where the bus asks again.
  *
- * Temperatures are converted twice a second, less often while they are constant. Where the requested
- * rate leaves a pause, that is done in the pause before a frame. Otherwise it takes the place of a
- * frame, at most one in 600 at OSR 256 and one in 25 at OSR 8192. That frame goes out at its time
- * too, with the pressures of the one before, and marked as held. All ones are no reading. A
- * sensor's last temperature is forgotten when it is admitted again. Its next temperature is the
- * next conversion. */
+ * Temperatures are converted twice a second, less often while they are constant. Where the requested rate leaves a
+ * pause, that is done in the pause before a frame. Otherwise it takes the place of a frame, at most one in 600 at OSR
+ * 256 and one in 25 at OSR 8192. That frame goes out at its time too, with the pressures of the one before, and marked
+ * as held. All ones are no reading. A sensor's last temperature is forgotten when it is admitted again. Its next
+ * temperature is the next conversion. */
 #pragma once
 
 #include "array_bus/array_bus.h"
@@ -206,7 +202,6 @@ static inline bool scan_is_well(const struct scan *scan, uint64_t now_us) {
   return scan->wait_until_us - now_us < SCAN_WAIT_MAX_us; /* past while an operation runs */
 }
 
-/* Main context. Effective from the next frame, for which the old rate's pause is cut short.
- * FT_ERR_ARGUMENT. */
+/* Main context. Effective from the next frame, for which the old rate's pause is cut short. FT_ERR_ARGUMENT. */
 enum ft_status scan_set_osr(struct scan *scan, uint16_t osr);
 void scan_set_rate_mHz(struct scan *scan, uint32_t rate_mHz);

@@ -1,12 +1,11 @@
 /* A USB CDC ACM device: the byte stream between the fingertip and its host.
  *
- * Sources: Universal Serial Bus Specification 2.0 chapter 9; USB Class Definitions for
- * Communications Devices 1.2 and its PSTN subclass 1.2 (ACM). The controller is the board's, behind
- * port/usb_controller.h. Exactly one exists per image.
+ * Sources: Universal Serial Bus Specification 2.0 chapter 9; USB Class Definitions for Communications Devices 1.2 and
+ * its PSTN subclass 1.2 (ACM). The controller is the board's, behind port/usb_controller.h. Exactly one exists per
+ * image.
  *
- * Interrupt context serves the controller; the functions below are for the main context. Between
- * the two are single-producer single-consumer rings, so nothing here locks or waits.
- */
+ * Interrupt context serves the controller; the functions below are for the main context. Between the two are
+ * single-producer single-consumer rings, so nothing here locks or waits. */
 #pragma once
 
 #include "common/status.h"

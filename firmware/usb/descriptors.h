@@ -1,7 +1,6 @@
 /* The device's description of itself: USB 2.0 section 9.6, CDC 1.2 section 5, PSTN 1.2 section 5.3.
  *
- * One configuration, one CDC function of two interfaces, grouped by an interface association.
- */
+ * One configuration, one CDC function of two interfaces, grouped by an interface association. */
 #pragma once
 
 #include "usb/cdc.h"

@@ -1,8 +1,7 @@
-/* The two halves of the USB device: device.c has what every device must do (USB 2.0 chapter 9: the
- * control endpoint, addresses, configurations, halted endpoints), cdc.c is the function.
+/* The two halves of the USB device: device.c has what every device must do (USB 2.0 chapter 9: the control endpoint,
+ * addresses, configurations, halted endpoints), cdc.c is the function.
  *
- * All of it runs in the interrupt context of the controller, but for device_start().
- */
+ * All of it runs in the interrupt context of the controller, but for device_start(). */
 #pragma once
 
 #include "usb/cdc.h"

@@ -1,16 +1,14 @@
-/* What interrupts may do to the main context, tried in every place: a checker of the hand-overs
- * between contexts that runs the firmware's own code.
+/* What interrupts may do to the main context, tried in every place: a checker of the hand-overs between contexts that
+ * runs the firmware's own code.
  *
- * The modules under test are compiled with -fsanitize=thread and linked without its library, so
- * that each access to memory they make calls a function here, as each piece of a memcpy does. An
- * access to a variable that is not on the stack is a point at which interrupts of a higher priority
- * may come, none, one or several, each of them whole. All choices are tried, one run for each, up
- * to so many interrupts in a run; then all that was static is as it was before.
+ * The modules under test are compiled with -fsanitize=thread and linked without its library, so that each access to
+ * memory they make calls a function here, as each piece of a memcpy does. An access to a variable that is not on the
+ * stack is a point at which interrupts of a higher priority may come, none, one or several, each of them whole. All
+ * choices are tried, one run for each, up to so many interrupts in a run; then all that was static is as it was before.
  *
- * Order within a context is that of this build: that the compiler of an image keeps it (release,
- * acquire, atomic_signal_fence) is not shown. A second processor is an interrupt too: it comes in
- * whole steps. A test of two processors lets each in turn be the one that is interrupted.
- */
+ * Order within a context is that of this build: that the compiler of an image keeps it (release, acquire,
+ * atomic_signal_fence) is not shown. A second processor is an interrupt too: it comes in whole steps. A test of two
+ * processors lets each in turn be the one that is interrupted. */
 #pragma once
 
 #include <stdbool.h>

@@ -14,8 +14,7 @@ static inline uint32_t golden_join(uint32_t crc, uint32_t next) {
   return crc32_iso_hdlc((const uint8_t *)both, sizeof both);
 }
 
-/* cases: in all; each makes some of found[]. The message has what to put in golden[] where a change
- * was meant. */
+/* cases: in all; each makes some of found[]. The message has what to put in golden[] where a change was meant. */
 static inline void golden_assert(const char *what, uint32_t cases, const uint32_t golden[GOLDEN_BLOCKS],
                                  const uint32_t found[GOLDEN_BLOCKS]) {
   const uint32_t block = cases / GOLDEN_BLOCKS;

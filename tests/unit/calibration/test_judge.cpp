@@ -70,8 +70,7 @@ TEST(Judge, accepts_good_sessions) {
   }
 }
 
-/* With the width that is expected such a dip looks like zeros that were off by more than
- * OFFSET_MAX. */
+/* With the width that is expected such a dip looks like zeros that were off by more than OFFSET_MAX. */
 TEST(Judge, accepts_a_dip_narrower_than_expected) {
   for (std::uint64_t seed = 160; seed < 170; seed++) {
     KnownPad pad(seed);

@@ -1,6 +1,5 @@
-/* Conditioning to the bit: frames by chance with presses, drifts, steps and sensors that fail. What
- * changes a reading was meant to, or is a mistake; where it was meant, the test says what to put
- * here. */
+/* Conditioning to the bit: frames by chance with presses, drifts, steps and sensors that fail. What changes a reading
+ * was meant to, or is a mistake; where it was meant, the test says what to put here. */
 #include "common/crc32.h"
 #include "condition/condition.h"
 #include "support/draw.h"

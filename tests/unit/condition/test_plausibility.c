@@ -1,5 +1,4 @@
-/* A sensor that reads apart from the others at rest is known from the first frame on, and no press
- * changes that. */
+/* A sensor that reads apart from the others at rest is known from the first frame on, and no press changes that. */
 #include "condition/plausibility.h"
 #include "support/unit.h"
 

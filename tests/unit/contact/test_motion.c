@@ -86,8 +86,7 @@ TEST(the_velocity_is_as_uncertain_as_least_squares_are) {
   TEST_ASSERT_DOUBLE_WITHIN(0.05 * expected_mm_s, expected_mm_s, sqrt(squares / runs));
 }
 
-/* As the estimate's noise is: what the location says ahead, the load says back, by 4 mm per Q / F.
- */
+/* As the estimate's noise is: what the location says ahead, the load says back, by 4 mm per Q / F. */
 TEST(noise_alone_never_speaks) {
   static const float noises_mm[] = {0.005f, 0.02f, 0.1f, 0.35f};
   struct random random = {7};

@@ -112,9 +112,8 @@ TEST(a_misfit_widens_what_goes_as_it_widens_the_place) {
   TEST_ASSERT_FLOAT_WITHIN(0.02f * taken[1], taken[1], 2.25f * taken[0]);
 }
 
-/* Half of the contacts are pulled, by 0.1 of the force along each axis. Errors of the load and of
- * the place go together, and their standard deviation is known as well as 15 readings less 8
- * unknowns tell it. */
+/* Half of the contacts are pulled, by 0.1 of the force along each axis. Errors of the load and of the place go
+ * together, and their standard deviation is known as well as 15 readings less 8 unknowns tell it. */
 TEST(places_are_nearer_than_with_any_load_or_none) {
   enum { CONTACTS = 20000 };
   const double sd = 0.03, own_mm = 0.05, force_N = 4.0;

@@ -9,8 +9,7 @@ namespace {
 
 using namespace fingertip;
 
-/* An ELF file with two functions: fit_frame of 0x20 bytes at 0x20001000, and a label at 0x20001100
- * without a size. */
+/* An ELF file with two functions: fit_frame of 0x20 bytes at 0x20001000, and a label at 0x20001100 without a size. */
 std::vector<std::uint8_t> small_elf() {
   const char names[] = "\0fit_frame\0label\0data";
   Elf32_Sym symbols[4] = {};

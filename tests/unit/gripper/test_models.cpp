@@ -64,9 +64,8 @@ TEST_P(GripperTest, IsNotActivatedByAMoveAfterItsPowerWasLost) {
   }
 }
 
-/* An exchange waits for 50 ms; half of the answers are up to 150 ms late while it closes and opens.
- * Where the question to be sure was asked again before its own answer had come, one status in
- * thirty was an older one. */
+/* An exchange waits for 50 ms; half of the answers are up to 150 ms late while it closes and opens. Where the question
+ * to be sure was asked again before its own answer had come, one status in thirty was an older one. */
 TEST_P(GripperTest, NoStatusIsOlderThanItsQuestionHoweverLateAnswersCome) {
   constexpr double NEAR_mm = 0.4; // a step, and how far it moves within a poll's own time
   const auto width_mm = [&] {

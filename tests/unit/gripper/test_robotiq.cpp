@@ -8,11 +8,10 @@ using namespace fingertip;
 using namespace fingertip::test;
 using namespace std::chrono_literals;
 
-/* Requests and answers are printed in Robotiq's "2F-85 & 2F-140 Instruction Manual" and "Hand-E
- * Gripper Instruction Manual", section Modbus RTU example; those with function 3 in the "2-Finger
- * Adaptive Gripper" manuals of 2013 and 2016; of one of them the 2013 edition prints the checksum
- * F7 8B beside another, this one is the packet's own. The two lines marked are no examples of
- * theirs. */
+/* Requests and answers are printed in Robotiq's "2F-85 & 2F-140 Instruction Manual" and "Hand-E Gripper Instruction
+ * Manual", section Modbus RTU example; those with function 3 in the "2-Finger Adaptive Gripper" manuals of 2013 and
+ * 2016; of one of them the 2013 edition prints the checksum F7 8B beside another, this one is the packet's own. The two
+ * lines marked are no examples of theirs. */
 TEST(RobotiqFrames, AreThoseOfTheManual) {
   Tape tape({
       {"09 04 07 D0 00 03 B1 CE", ""}, // before function 4 no answer comes

@@ -212,8 +212,7 @@ TEST(Monitor, TracesHaveAxesAndSensorsNumbersAndBothPressures) {
   for (int k = 0; k < 15; k++) {
     EXPECT_TRUE(shows(canvas, " " + std::to_string(k) + " ")) << k << "\n" << text_of(canvas);
   }
-  /* Of 5 N over 2 pi (5.7 mm)^2, 24.5 kPa, exp(-81 / 2 / 5.7^2) at 9 mm: 7.0 kPa; over a gain of a
-   * half 14 kPa. */
+  /* Of 5 N over 2 pi (5.7 mm)^2, 24.5 kPa, exp(-81 / 2 / 5.7^2) at 9 mm: 7.0 kPa; over a gain of a half 14 kPa. */
   wire_packet info = test::make_info(0, 0);
   info.body.info.stored = WIRE_STORED_CALIBRATION;
   EXPECT_TRUE(shows(canvas, "7.0")) << text_of(canvas);

@@ -1,10 +1,8 @@
-/* rp2040/i2c.h, rp2040/event.h and the reset pins of rp2040/gpio.h without a chip: three TCA9548A
- * and fifteen sensors in place of the controller, at the speed of a 400 kHz bus, with faults on
- * request.
+/* rp2040/i2c.h, rp2040/event.h and the reset pins of rp2040/gpio.h without a chip: three TCA9548A and fifteen sensors
+ * in place of the controller, at the speed of a 400 kHz bus, with faults on request.
  *
- * A sensor answers a read with fake_byte() of the command it got last. If several answer at once
- * the bytes are wired-AND, as on the bus, and counted in `collisions`.
- */
+ * A sensor answers a read with fake_byte() of the command it got last. If several answer at once the bytes are
+ * wired-AND, as on the bus, and counted in `collisions`. */
 #pragma once
 
 #include "pico_mux/mux_bus.h"

@@ -16,8 +16,7 @@ const wire_info INFO = test::make_info(0, 0).body.info;
 
 pad_profile profile_of(double thickness_mm) { return pad::profile_of({thickness_mm}, INFO); }
 
-/* The integral of f over wave numbers, by the trapezoidal rule of other nodes than the profile's.
- */
+/* The integral of f over wave numbers, by the trapezoidal rule of other nodes than the profile's. */
 double over_waves(const std::function<double(double)> &f) {
   double sum = 0;
   for (int i = 1; i < 30000; i++) {

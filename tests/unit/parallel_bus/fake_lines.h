@@ -1,9 +1,8 @@
-/* rp2040/wave_player.h without a chip: sixteen wired-AND lines and fifteen sensors that follow the
- * edges on them bit by bit, with faults on request.
+/* rp2040/wave_player.h without a chip: sixteen wired-AND lines and fifteen sensors that follow the edges on them bit by
+ * bit, with faults on request.
  *
- * Every edge is held against UM10204, fast mode, with a rise of 300 ns from 0.3 to 0.7 VDD, 426 ns
- * from the release on, and a fall of 180 ns; what breaks it is a misuse.
- */
+ * Every edge is held against UM10204, fast mode, with a rise of 300 ns from 0.3 to 0.7 VDD, 426 ns from the release on,
+ * and a fall of 180 ns; what breaks it is a misuse. */
 #pragma once
 
 #include "pico_parallel/i2c_wave.h"

@@ -206,9 +206,8 @@ TEST(test_a_line_held_for_good_is_clocked_ever_more_rarely) {
   TEST_ASSERT_LESS_OR_EQUAL_UINT(2, fake.waves - before);
 }
 
-/* A sensor that misses a clock, or sees one too many, at every place of a read: it is left out, or
- * wrong in the last byte only, or it has seen no acknowledgement and the last byte is all ones. It
- * is back two commands later. */
+/* A sensor that misses a clock, or sees one too many, at every place of a read: it is left out, or wrong in the last
+ * byte only, or it has seen no acknowledgement and the last byte is all ones. It is back two commands later. */
 TEST(test_a_disturbed_clock_at_every_place) {
   for (int doubles = 0; doubles < 2; doubles++) {
     for (unsigned at = 1; at <= 57; at++) {

@@ -384,9 +384,8 @@ static void forget_places(struct calibration *calibration) {
   }
 }
 
-/* The firmware before the sensors' places kept 32 of them in slots of 512 bytes. Eight records, as
- * it wrote them: the last counts, and the next goes into the other sector, whenever power is lost.
- */
+/* The firmware before the sensors' places kept 32 of them in slots of 512 bytes. Eight records, as it wrote them: the
+ * last counts, and the next goes into the other sector, whenever power is lost. */
 TEST(short_slots_of_the_largest_array_are_read) {
   enum { SLOT = STORE_SHORT_SLOT_BYTES, LENGTH = LENGTH_OF_3(FT_MAX_SENSORS) };
   for (unsigned records = 1; records <= STORE_SLOTS; records++) {
