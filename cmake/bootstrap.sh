@@ -75,7 +75,6 @@ arm-none-eabi-gcc gcc-arm-none-eabi
 /usr/lib/arm-none-eabi/newlib/nano.specs libnewlib-arm-none-eabi
 /usr/include/fftw3.h libfftw3-dev
 /usr/include/libusb-1.0/libusb.h libusb-1.0-0-dev
-/usr/include/modbus/modbus.h libmodbus-dev
 /usr/include/zstd.h libzstd-dev
 /usr/include/CLI/CLI.hpp libcli11-dev
 /usr/include/eigen3/Eigen/Dense libeigen3-dev

@@ -1,7 +1,7 @@
 #include "grasp/gripper/common.hpp"
 
-#include "grasp/gripper/serial_line.hpp"
-
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 
 namespace fingertip {
@@ -35,9 +35,84 @@ GripperWay complete(GripperWay way, const GripperUsual &usual) {
   return way;
 }
 
-Error silent(const GripperWay &way) {
-  return Error(ErrorCode::gripper_silent, way.port + ": no answer from slave " + std::to_string(way.slave) +
-                                              " within " + std::to_string(std::lround(way.timeout_s * 1000)) + " ms");
+AskedLine::Bytes AskedLine::exchange(const Bytes &question, std::size_t length) {
+  make_sure();
+  send(question);
+  doubtful_ = true; // until it is answered: who answers late answers the next question
+  sure_number_ = 0;
+  Bytes answer = hear(question, length);
+  doubtful_ = false;
+  return answer;
+}
+
+void AskedLine::make_sure() {
+  if (!doubtful_) {
+    return;
+  }
+  const bool again = sure_number_ == 0 || host_now() >= sure_until_;
+  sure_number_ = !again ? sure_number_ : sure_number_ == 1 ? 2 : 1;
+  const auto [question, length] = sure_question(sure_number_);
+  if (again) {
+    sure_until_ = host_now() + SURE_TIMEOUTS * timeout();
+    send(question);
+  }
+  hear(question, length);
+  doubtful_ = false;
+}
+
+void AskedLine::send(const Bytes &question) {
+  line_.drop_input();
+  asked_us_ = steady_now_us();
+  if (!line_.transport().write(question.data(), question.size())) {
+    throw Error(ErrorCode::gone, way_.port + ": gone");
+  }
+}
+
+AskedLine::Bytes AskedLine::hear(const Bytes &question, std::size_t length) {
+  Bytes came, payload;
+  std::size_t noise = 0;
+  bool other_slave = false, other_answer = false, echo_gone = false;
+  const HostTime until = host_now() + timeout();
+  for (;;) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - host_now());
+    std::uint8_t bytes[256];
+    std::size_t count = 0;
+    if (left.count() <= 0) {
+      break;
+    }
+    if (line_.transport().read(bytes, sizeof bytes, &count, left) == Transport::Result::gone) {
+      throw Error(ErrorCode::gone, way_.port + ": gone");
+    }
+    came.insert(came.end(), bytes, bytes + count);
+    if (!echo_gone && came.size() >= question.size()) {
+      echo_gone = true;
+      if (std::equal(question.begin(), question.end(), came.begin())) {
+        came.erase(came.begin(), came.begin() + static_cast<std::ptrdiff_t>(question.size()));
+      }
+    } else if (!echo_gone && std::equal(came.begin(), came.end(), question.begin())) {
+      continue;
+    }
+    for (Heard heard; (heard = take(question, length, &came, &noise, &payload)) != Heard::nothing;) {
+      if (heard == Heard::fits) {
+        return payload;
+      }
+      other_slave = other_slave || heard == Heard::other_slave;
+      other_answer = other_answer || heard == Heard::other_answer;
+    }
+  }
+  if (other_slave || other_answer) {
+    throw Error(ErrorCode::gripper_garbled,
+                way_.port + (other_slave ? ": another slave answers" : ": an answer is not one to the question"));
+  }
+  if (noise + came.size() > 0) {
+    throw Error(ErrorCode::gripper_garbled, way_.port + ": an answer is damaged (checksum)");
+  }
+  throw Error(ErrorCode::gripper_silent, way_.port + ": no answer from slave " + std::to_string(way_.slave) +
+                                             " within " + std::to_string(std::lround(way_.timeout_s * 1000)) + " ms");
+}
+
+std::chrono::microseconds AskedLine::timeout() const {
+  return std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
 }
 
 std::string limited_by(const std::string &port, int exchanges) {

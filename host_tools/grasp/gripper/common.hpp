@@ -2,9 +2,13 @@
 #pragma once
 
 #include "grasp/gripper/gripper.hpp"
+#include "grasp/gripper/serial_line.hpp"
+#include "libfingertip/clock.hpp"
 
 #include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace fingertip {
 
@@ -17,12 +21,51 @@ struct GripperUsual {
 };
 GripperWay complete(GripperWay way, const GripperUsual &usual);
 
-// An extra question makes sure that no older answer is on its way. It waits this much longer than any
-// other question, and is then asked in another form. An answer that is late by less than that is
-// never taken for another's.
-constexpr int SURE_TIMEOUTS = 5;
+// Questions to a gripper and its answers, in the maker's protocol. An adapter that hears itself is
+// recognised: the question comes back before the answer.
+//
+// Answers have no number: a late one would pass for that to the next question. But they come in the
+// order of the questions. So after a question without an answer another is asked, once, whose answer
+// no other has, and what comes before that is not expected. It waits SURE_TIMEOUTS times as long as any
+// other; where its answer is lost the question with the other number is asked, lest the first come
+// after all. An answer that is late by less than that is never taken for another's.
+class AskedLine {
+public:
+  using Bytes = std::vector<std::uint8_t>;
+  static constexpr int SURE_TIMEOUTS = 5;
 
-Error silent(const GripperWay &complete);
+  // complete: complete() has made it so.
+  AskedLine(const GripperWay &complete, unsigned baud) : way_(complete), line_(complete.port, baud) {}
+
+protected:
+  ~AskedLine() = default;
+
+  enum class Heard { nothing, other_slave, other_answer, fits };
+  // Takes the first whole frame out of what came. The payload of one that fits a question; noise counts bytes of no
+  // frame. Throws Error: gripper_refused.
+  virtual Heard take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) = 0;
+  // That question, 1 or 2, and the length of its answer's payload.
+  virtual std::pair<Bytes, std::size_t> sure_question(int number) const = 0;
+
+  // question: the whole frame. Returns the answer's payload, which has this length. Throws Error: gone,
+  // gripper_silent, gripper_garbled, gripper_refused.
+  Bytes exchange(const Bytes &question, std::size_t length);
+  void make_sure(); // before every exchange
+  void doubt() { doubtful_ = true; }
+
+  const GripperWay way_;
+  SerialLine line_;
+  std::int64_t asked_us_ = 0; // the last question
+
+private:
+  void send(const Bytes &question);
+  Bytes hear(const Bytes &question, std::size_t length);
+  std::chrono::microseconds timeout() const;
+
+  bool doubtful_ = false; // an answer may still come that is not expected
+  int sure_number_ = 0;   // which sure question has been asked, 0: none,
+  HostTime sure_until_{}; // and is still waited for
+};
 
 // "; the USB adapter's latency timer ..." where that limits the rate of a command, which takes so
 // many exchanges; "" where it does not.

@@ -1,6 +1,5 @@
 #include "grasp/gripper/feetech.hpp"
 
-#include "grasp/gripper/common.hpp"
 #include "libfingertip/clock.hpp"
 #include "libfingertip/text.hpp"
 
@@ -144,8 +143,7 @@ GripperWay feetech_way(const GripperWay &way) {
 }
 
 FeetechGripper::FeetechGripper(const GripperWay &given)
-    : way_(feetech_way(given)), jaw_(way_), traits_(feetech_traits(way_.model, jaw_, way_.jaw_mm)),
-      line_(way_.port, BAUD) {
+    : AskedLine(feetech_way(given), BAUD), jaw_(way_), traits_(feetech_traits(way_.model, jaw_, way_.jaw_mm)) {
   const Bytes table = read(MODEL, OPERATING_MODE + 1 - MODEL);
   servo_model_ = word(table, 0);
   const int mode = table[OPERATING_MODE - MODEL];
@@ -156,112 +154,33 @@ FeetechGripper::FeetechGripper(const GripperWay &given)
   poll();
 }
 
-Bytes FeetechGripper::exchange(const Packet &question, std::size_t answer_length) {
-  const HostTime until = send(question);
-  doubtful_ = true;
-  sure_length_ = 0;
-  Bytes answer = hear(question, answer_length, until);
-  doubtful_ = false;
-  return answer;
+AskedLine::Heard FeetechGripper::take(const Bytes &, std::size_t length, Bytes *came, std::size_t *noise,
+                                      Bytes *payload) {
+  const std::optional<Packet> answer = take_packet(came, noise);
+  if (!answer) {
+    return Heard::nothing;
+  }
+  *payload = answer->parameters;
+  return answer->id != way_.slave ? Heard::other_slave : payload->size() != length ? Heard::other_answer : Heard::fits;
 }
 
-HostTime FeetechGripper::send(const Packet &question) {
-  const Bytes sent = encoded(question);
-  line_.drop_input();
-  if (!line_.transport().write(sent.data(), sent.size())) {
-    throw Error(ErrorCode::gone, way_.port + ": gone");
-  }
-  return host_now() + timeout();
+// Two or three bytes: no other answer has so few.
+std::pair<AskedLine::Bytes, std::size_t> FeetechGripper::sure_question(int number) const {
+  return {question_of(READ, {MODEL, static_cast<std::uint8_t>(number + 1)}), static_cast<std::size_t>(number + 1)};
 }
 
-Bytes FeetechGripper::hear(const Packet &question, std::size_t answer_length, HostTime until) {
-  const Bytes sent = encoded(question);
-  Bytes came;
-  std::size_t noise = 0;
-  bool other_slave = false, other_answer = false, echo_gone = false;
-  for (;;) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - host_now());
-    std::uint8_t bytes[256];
-    std::size_t length = 0;
-    if (left.count() <= 0) {
-      break;
-    }
-    const Transport::Result result = line_.transport().read(bytes, sizeof bytes, &length, left);
-    if (result == Transport::Result::gone) {
-      throw Error(ErrorCode::gone, way_.port + ": gone");
-    }
-    came.insert(came.end(), bytes, bytes + length);
-    // Some adapters hear themselves on the one wire.
-    if (!echo_gone && came.size() >= sent.size()) {
-      echo_gone = true;
-      if (std::equal(sent.begin(), sent.end(), came.begin())) {
-        came.erase(came.begin(), came.begin() + static_cast<std::ptrdiff_t>(sent.size()));
-      }
-    } else if (!echo_gone && std::equal(came.begin(), came.end(), sent.begin())) {
-      continue;
-    }
-    while (std::optional<Packet> answer = take_packet(&came, &noise)) {
-      if (answer->id != question.id) {
-        other_slave = true;
-      } else if (answer->parameters.size() != answer_length) {
-        other_answer = true;
-      } else {
-        return answer->parameters;
-      }
-    }
-  }
-  if (other_slave || other_answer) {
-    throw Error(ErrorCode::gripper_garbled,
-                way_.port + (other_slave ? ": another slave answers" : ": an answer is not one to the question"));
-  }
-  if (noise + came.size() > 0) {
-    throw Error(ErrorCode::gripper_garbled, way_.port + ": an answer is damaged (checksum)");
-  }
-  throw silent(way_);
-}
-
-std::chrono::microseconds FeetechGripper::timeout() const {
-  return std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
-}
-
-// Answers have no number: a late one would pass for that to the next question. But they come in the
-// order of the questions. So two or three bytes are asked for, once, which no other answer has, and
-// answers before them are not expected. Where they are lost the other number is asked
-// for, lest the first come after all.
-void FeetechGripper::make_sure() {
-  if (!doubtful_) {
-    return;
-  }
-  const auto question = [this] {
-    return ours({.code = READ, .parameters = {MODEL, static_cast<std::uint8_t>(sure_length_)}});
-  };
-  if (sure_length_ == 0 || host_now() >= sure_until_) {
-    sure_length_ = sure_length_ == 2 ? 3 : 2;
-    sure_until_ = host_now() + SURE_TIMEOUTS * timeout();
-    send(question());
-  }
-  hear(question(), static_cast<std::size_t>(sure_length_), host_now() + timeout());
-  doubtful_ = false;
-}
-
-Packet FeetechGripper::ours(Packet question) const {
-  question.id = static_cast<std::uint8_t>(way_.slave);
-  return question;
-}
-
-Bytes FeetechGripper::ask(Packet question, std::size_t answer_length) {
-  make_sure();
-  return exchange(ours(std::move(question)), answer_length);
+Bytes FeetechGripper::question_of(std::uint8_t instruction, const Bytes &parameters) const {
+  return encoded({static_cast<std::uint8_t>(way_.slave), instruction, parameters});
 }
 
 Bytes FeetechGripper::read(std::uint8_t address, std::uint8_t length) {
-  return ask({.code = READ, .parameters = {address, length}}, length);
+  return exchange(question_of(READ, {address, length}), length);
 }
 
 void FeetechGripper::write(std::uint8_t address, const Bytes &values) {
-  Packet packet = {.code = WRITE, .parameters = {address}};
-  packet.parameters.insert(packet.parameters.end(), values.begin(), values.end());
-  ask(std::move(packet), 0);
+  Bytes parameters = {address};
+  parameters.insert(parameters.end(), values.begin(), values.end());
+  exchange(question_of(WRITE, parameters), 0);
 }
 
 GripperStatus FeetechGripper::poll() {

@@ -9,10 +9,8 @@
 // jaw. This is only a guess of the force in newtons: friction in the gears is at least as large.
 #pragma once
 
+#include "grasp/gripper/common.hpp"
 #include "grasp/gripper/feetech_table.hpp"
-#include "grasp/gripper/gripper.hpp"
-#include "grasp/gripper/serial_line.hpp"
-#include "libfingertip/clock.hpp"
 
 namespace fingertip {
 
@@ -41,7 +39,7 @@ GripperTraits feetech_traits(const std::string &model, const Jaw &jaw, double ja
 // GripperWay, completed by the defaults. Throws Error: bad_value.
 GripperWay feetech_way(const GripperWay &way);
 
-class FeetechGripper : public Gripper {
+class FeetechGripper final : public Gripper, AskedLine {
 public:
   explicit FeetechGripper(const GripperWay &given);
 
@@ -55,26 +53,17 @@ public:
   std::string fault_text(std::uint8_t fault) const override;
 
 private:
-  feetech::Bytes exchange(const feetech::Packet &question, std::size_t answer_length);
-  HostTime send(const feetech::Packet &question); // until when to wait
-  feetech::Bytes hear(const feetech::Packet &question, std::size_t answer_length, HostTime until);
-  void make_sure();
-  feetech::Packet ours(feetech::Packet question) const;
-  std::chrono::microseconds timeout() const;
-  feetech::Bytes ask(feetech::Packet question, std::size_t answer_length);
-  feetech::Bytes read(std::uint8_t address, std::uint8_t length);
-  void write(std::uint8_t address, const feetech::Bytes &values);
+  Heard take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) override;
+  std::pair<Bytes, std::size_t> sure_question(int number) const override;
+  Bytes question_of(std::uint8_t instruction, const Bytes &parameters) const;
+  Bytes read(std::uint8_t address, std::uint8_t length);
+  void write(std::uint8_t address, const Bytes &values);
   void command(double count, int speed, int torque);
 
-  GripperWay way_; // complete
   Jaw jaw_;
   GripperTraits traits_;
-  SerialLine line_;
   int servo_model_ = 0;
-  bool doubtful_ = false; // an answer may still come that is not expected
-  int sure_length_ = 0;   // of the answer that make_sure has asked for, 0: none yet,
-  HostTime sure_until_{}; // and still waits for
-  bool active_ = false;   // by the last status
+  bool active_ = false; // by the last status
   std::int64_t commanded_us_ = 0;
   double goal_count_ = -1;
 };

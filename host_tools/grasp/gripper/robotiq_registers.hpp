@@ -8,8 +8,18 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 namespace fingertip::robotiq {
+
+constexpr std::uint8_t WRITE = 16, WRITE_AND_READ = 23; // functions
+constexpr std::uint8_t EXCEPTION = 0x80;                // added to one that is refused
+
+using Bytes = std::vector<std::uint8_t>;
+
+// Modbus' checksum; 0 of a frame with its own.
+std::uint16_t crc_of(const Bytes &bytes);
+Bytes with_crc(Bytes bytes);
 
 constexpr int BAUD = 115200;
 constexpr int SLAVE = 9;

@@ -17,7 +17,7 @@ public:
 
   SerialTransport &transport() { return transport_; }
   const std::string &path() const { return path_; }
-  // libmodbus' descriptor; -1 once the port vanished.
+  // -1 once the port vanished.
   int descriptor() const;
   // Forgets what came and was not read.
   void drop_input();

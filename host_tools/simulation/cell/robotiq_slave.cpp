@@ -1,5 +1,4 @@
-// A simulated Robotiq gripper: a Modbus slave of its own, which libmodbus on the other end judges, and registers
-// (gripper/robotiq_registers.hpp) over its motion.
+// A simulated Robotiq gripper: a Modbus slave and registers (gripper/robotiq_registers.hpp) over its motion.
 //
 // After the manuals: activation begins where rACT rises and takes its time; a move before gives gFLT 7, one while
 // it goes on gFLT 5 and is done afterwards. Assumed, for nothing is public: gFLT 9 is reported once, by the first
@@ -20,29 +19,7 @@ namespace {
 
 constexpr double FULL_CURRENT_A = 1.0;
 
-constexpr std::uint8_t WRITE = 16, WRITE_AND_READ = 23; // functions
-constexpr std::uint8_t EXCEPTION = 0x80, ILLEGAL_FUNCTION = 1;
-
-using Bytes = std::vector<std::uint8_t>;
-
-// 0 of a frame with its own.
-std::uint16_t crc_of(const Bytes &bytes) {
-  std::uint16_t crc = 0xFFFF;
-  for (const std::uint8_t byte : bytes) {
-    crc ^= byte;
-    for (int bit = 0; bit < 8; bit++) {
-      crc = static_cast<std::uint16_t>(crc & 1 ? crc >> 1 ^ 0xA001 : crc >> 1);
-    }
-  }
-  return crc;
-}
-
-Bytes with_crc(Bytes bytes) {
-  const std::uint16_t crc = crc_of(bytes);
-  bytes.push_back(static_cast<std::uint8_t>(crc & 0xFF));
-  bytes.push_back(static_cast<std::uint8_t>(crc >> 8));
-  return bytes;
-}
+constexpr std::uint8_t ILLEGAL_FUNCTION = 1;
 
 class RobotiqSlave : public GripperServer::Slave {
 public:
