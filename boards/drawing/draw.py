@@ -8,7 +8,7 @@ draw.py --lay      lays circuit boards: seconds for each boards/<board>/pcb, int
 boards/<board>/wiring.svg                  from board.json
 boards/<board>/README.md, wiring and parts from board.json and parts.json
 boards/<board>/pcb/, picture, BOM, placement from the .kicad_pcb there and parts.json
-boards/placement.svg, boards/mould.svg     at 1:1, from firmware/config/geometry.c
+boards/placement.svg, boards/mould.svg     at 1:1, from boards/pads/3x5.json
 boards/BUILD.md, measures                  the same as a table
 """
 

@@ -1,7 +1,7 @@
-/* Where the sensors are. The one table of the array's layout; everything else takes it from here.
+/* Where the sensors are: of the pad that is built for (FINGERTIP_PAD, boards/pads/README.md).
  *
- * Coordinates in mm in the plane of the pad, origin in its centre, x across the strips, y along them. Sensor k = 5 *
- * strip + position along the strip, as the boards wire them. */
+ * Coordinates in mm in the plane of the pad, origin in its centre, x across the strips, y along them. On the boards' own pad
+ * sensor k = 5 * strip + position along the strip. */
 #pragma once
 
 #include "common/limits.h"
@@ -15,5 +15,4 @@ struct geometry {
   float y_mm[FT_MAX_SENSORS];
 };
 
-/* Three strips of five MS5840, pitch 9 mm (De Clercq et al., RA-L 2022, section III.A). */
 extern const struct geometry geometry;

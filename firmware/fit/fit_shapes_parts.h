@@ -23,7 +23,7 @@ _Static_assert(PULL_Y + 1 == UNKNOWNS, "a column for each");
 _Static_assert(MODELS == FIT_SHAPES_PARTS, "a part for each");
 
 #define ONE_Q20 (1 << 20)
-#define FREEDOM (NODES - 6) /* readings and priors less the unknowns of two */
+#define FREEDOM (NODES > 7 ? NODES - 6 : 1) /* readings and priors less the unknowns of two */
 #define PER_SD_MAX_Q4 1024
 
 /* One and a half pitches beyond the outer nodes. */

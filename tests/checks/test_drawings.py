@@ -170,8 +170,8 @@ class Tree(unittest.TestCase):
         self.assertEqual([line.split()[0] for line in err.splitlines()], [f"boards/{name}/wiring.svg", f"boards/{name}/README.md"])
         self.assertEqual(self.told(), (0, ""))
         self.assertEqual(self.told("--check"), (0, ""))
-        source = self.tree / "firmware/config/geometry.c"
-        source.write_text(source.read_text().replace("{-9, -9", "{-10, -9", 1))
+        source = self.tree / "boards/pads/3x5.json"
+        source.write_text(source.read_text().replace('"pitch_mm": 9', '"pitch_mm": 9.5', 1))
         status, err = self.told("--check")
         self.assertEqual([line.split()[0] for line in err.splitlines()], ["boards/placement.svg", "boards/mould.svg", "boards/BUILD.md"])
 

@@ -303,7 +303,7 @@ std::string text_of(const Judgement &j, std::size_t placements) {
            "the sensors are alike, or something changed meanwhile";
   case Reason::layout:
     return "the sensors seem to sit " + fixed(s.spread.position_mm, 2) +
-           " mm from where the firmware has them: see geometry.c";
+           " mm from where the firmware has them: see the pad that it was built for";
   case Reason::silent:
     return "sensors " + list_of(j.silent) +
            " measured nothing under the weight, or gave no valid reading: see fingertip info; one that answers is not "

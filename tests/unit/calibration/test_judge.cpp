@@ -248,7 +248,7 @@ TEST(Judge, refuses_sensors_in_other_places) {
     pad.x_mm[k] += k % 2 ? 0.8 : -0.8;
     pad.y_mm[k] += k % 3 ? 0.8 : -0.8;
   }
-  expect_refused(judge(pad.array, good_session(pad, 30, 72), true), Reason::layout, "geometry.c");
+  expect_refused(judge(pad.array, good_session(pad, 30, 72), true), Reason::layout, "pad that it was built for");
 }
 
 TEST(Force, one_known_weight_gives_the_scale) {
