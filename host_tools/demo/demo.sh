@@ -96,8 +96,11 @@ for name in rubber raw; do
   wait_for_answer $name
   $tool set --port $out/$name.tty osr=256 rate=max > /dev/null || fail "the fingertip cannot be set"
 done
-FINGERTIP_PORT=$out/rubber.tty:$out/raw.tty $tool monitor --device $rubber --device $raw --until-gone --record $out/recording.csv ||
-  fail "the monitor ended with an error"
+watch() {
+  FINGERTIP_PORT=$out/rubber.tty:$out/raw.tty $tool monitor --device $rubber --device $raw --until-gone --record $out/recording.csv ||
+    fail "the monitor ended with an error"
+}
+if [ -t 1 ]; then watch; else watch > $out/monitor.txt; fi # where no screen can be drawn, a line each second
 wait $rubber_process || fail "the emulator found something wrong"
 kill -INT $raw_process 2> /dev/null || true # however far it came: it ends with the other
 wait $raw_process || [ $? -eq 130 ] || fail "the emulator found something wrong"

@@ -50,8 +50,7 @@ Place::Place(const std::string &folder)
   }
   if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
     close(lock_);
-    throw Error(ErrorCode::file_exists, folder_ + ": another simulation has its ports there; end that one, or choose "
-                                                  "another folder (--ports)");
+    throw Error(folder_ + ": another simulation has its ports there; end that one, or choose another folder (--ports)");
   }
 }
 

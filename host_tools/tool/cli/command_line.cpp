@@ -1,11 +1,13 @@
 #include "tool/cli/command_line.hpp"
 
+#include "libfingertip/line_sink.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/cli/installed_files.hpp"
 #include "tool/plain_help.hpp"
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <map>
 #include <numeric>
 
@@ -94,6 +96,14 @@ int CommandLine::run(int argc, char **argv) {
   }
   catch_signals();
   return chosen_();
+}
+
+void check_recording(const std::string &path, bool overwrite) {
+  const auto end = std::filesystem::path(path).extension();
+  if (!end.empty() && end != ".csv" && end != ".CSV" && !is_mcap_name(path)) {
+    throw WrongUsage("\"" + printable(path) + "\" must end with .csv or .mcap, which selects the format");
+  }
+  check_output(path, overwrite);
 }
 
 void with_transport(CLI::App *command, Reach &reach) {

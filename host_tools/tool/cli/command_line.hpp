@@ -41,6 +41,9 @@ private:
   std::function<int()> chosen_;
 };
 
+/* Of a recording that is to be written. Throws Error, and WrongUsage for an ending of another format. */
+void check_recording(const std::string &path, bool overwrite);
+
 /* --transport; --port too; --device too. */
 void with_transport(CLI::App *command, Reach &reach);
 void with_port_only(CLI::App *command, Choice &choice);

@@ -252,7 +252,7 @@ class ErrorsPeopleMeet(CliTest):
         if self.start("list").wait() == 0:
             self.skipTest("a fingertip is plugged in")
         for command in (["list"], ["info"], ["monitor"], ["record", self.csv], ["tare"], ["set", "rate=max"], ["loader"]):
-            self.assertRegex(self.error(*command), "^fingertip: no fingertip found; plug one in")
+            self.assertRegex(self.error(*command), "^fingertip: no fingertip found; plug one in.*`fingertip simulate`$")
         self.assertRegex(self.error("monitor", "--transport", "usb"), "^fingertip: no fingertip found by libusb; plug one in")
         self.assertFalse(os.path.exists(self.csv))
 
@@ -278,7 +278,11 @@ class ErrorsPeopleMeet(CliTest):
                 self.error("info", "--port", self.port),
                 f'fingertip: {self.port}: vanished before it answered "info"; plug it in and try again\n',
             )
-        for command, told in (["record", self.csv], "stderr"), (["monitor"], "stdout"), (["record", self.ftr, "--all"], "stderr"):
+        for command, told in (
+            (["record", self.csv], "stderr"),
+            (["monitor"], "stdout"),
+            (["record", self.path("all.csv"), "--all"], "stderr"),
+        ):
             self.environment["FINGERTIP_PORT"] = self.port
             with self.device() as device:
                 process = self.start(*command)
@@ -387,7 +391,7 @@ class Commands(CliTest):
         self.assertIn(f"{self.port}: sensors missing: 3 7; see their wiring (fingertip info)\n", err)
         self.assertEqual(err.count("see their wiring"), 1)
         with self.device("frames=50"):
-            self.assertNotIn("missing", self.run_cli("record", self.ftr, "--port", self.port, "--until-gone")[1])
+            self.assertNotIn("missing", self.run_cli("record", self.csv, "--overwrite", "--port", self.port, "--until-gone")[1])
 
     def test_without_any_sensor_it_fails(self):
         with self.device(self.MISSING_ALL, "frames=50"):

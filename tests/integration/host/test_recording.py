@@ -95,12 +95,12 @@ class Recording(CliTest):
         pathlib.Path(self.csv).write_text("precious")
         self.assertIn("exists already", self.error("record", self.csv))
         self.assertIn("exists already", self.error("monitor", "--record", self.csv))
-        self.assertIn("exists already", self.error("record", self.ftr, "--raw-bytes", self.csv))
+        self.assertIn("exists already", self.error("record", self.path("2.csv"), "--raw-bytes", self.csv))
         # nor does --overwrite touch them while nothing answers
         self.assertIn("no such port", self.error("record", self.csv, "--port", self.port, "--overwrite"))
         heard = os.path.join(self.folder, "heard")
         with self.device("mute=1", f"heard={heard}"):
-            process = self.start("record", self.ftr, "--raw-bytes", self.csv, "--port", self.port, "--overwrite")
+            process = self.start("record", self.path("2.csv"), "--raw-bytes", self.csv, "--port", self.port, "--overwrite")
             self.world.until(lambda: os.path.exists(heard))
             self.interrupt(process, status=1)
         self.assertEqual(pathlib.Path(self.csv).read_text(), "precious")
@@ -114,6 +114,7 @@ class Recording(CliTest):
         for option in ([], ["--overwrite"]):
             self.assertIn("No such file or directory; choose another place", self.error("record", self.folder + "/no/r.csv", *option))
             self.assertIn("is a folder; give the name of a file in it", self.error("record", self.folder, *option))
+            self.assertIn("must end with .csv or .mcap", self.error("record", self.folder + "/r.mcpa", *option, status=2))
             self.assertIn("is a folder", self.error("record", self.csv, "--raw-bytes", self.folder + "/", *option))
 
 

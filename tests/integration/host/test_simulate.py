@@ -117,7 +117,7 @@ class Presses(SimulateTest):
             _, err = process.communicate()
             self.assertEqual(process.returncode, 1)
             self.assertRegex(
-                err, "^fingertip: .*/fingertip/simulated: another simulation has its ports there; end that one, or choose another folder"
+                err, r"/fingertip/simulated: another simulation has its ports there; end that one, or .* folder \(--ports\)\n$"
             )
         self.assertIn("sim:: nothing is simulated there; start `fingertip simulate`", self.error("info", "--port", "sim:"))
         with self.simulated():  # what was left is in nobody's way

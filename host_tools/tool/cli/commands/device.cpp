@@ -45,7 +45,7 @@ int list(Reach reach) {
   std::vector<Found> all = finds.here;
   all.insert(all.end(), finds.in_environment.begin(), finds.in_environment.end());
   if (all.empty()) {
-    throw Error("no fingertip found; plug one in, or name its port in FINGERTIP_PORT");
+    throw Error(ErrorCode::no_fingertip, "no fingertip found");
   }
   for (const Found &found : all) {
     Metadata info = {{"serial", found.serial}};

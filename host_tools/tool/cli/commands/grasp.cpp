@@ -467,7 +467,7 @@ int run(const GraspOptions &options) {
   limits.insert(options.breaking.begin(), options.breaking.end()); // a limit of its own stays
   const GripSettings settings = typed([&] { return settings_for(gripper_traits(options.gripper.model), limits); });
   if (!options.recording.empty()) {
-    check_output(options.recording, options.overwrite);
+    check_recording(options.recording, options.overwrite);
   }
   return GraspSession(options, settings).run();
 }

@@ -394,10 +394,11 @@ private:
 
 /* Before a port is opened, so that a wrong path costs nothing. Throws Error. */
 void check_outputs(const LiveOptions &options) {
-  for (const std::string &path : {options.recording, options.raw_bytes}) {
-    if (!path.empty() && path != STDOUT_NAME) {
-      check_output(path, options.overwrite);
-    }
+  if (!options.recording.empty() && options.recording != STDOUT_NAME) {
+    check_recording(options.recording, options.overwrite);
+  }
+  if (!options.raw_bytes.empty()) {
+    check_output(options.raw_bytes, options.overwrite);
   }
   if (!options.recording.empty() && !options.raw_bytes.empty() && is_same_file(options.recording, options.raw_bytes)) {
     throw Error(options.raw_bytes + ": is the recording too; give --raw-bytes another name");
