@@ -8,7 +8,7 @@ from sheet import number
 
 THICK_mm = 1.6
 MIDDLE_mm = 100  # of the pad, on KiCad's sheet
-SCREW_FREE_mm = 3.4  # around a screw: the head and the nut of an M3
+HEAD_mm, SCREW_FREE_mm = 3.2, 3.4  # of an M3's nut across its corners, half; without tracks
 UNDER_PICO_mm = (-3.9, -25.1, 3.9, -11.3)  # from its middle: test points, and the solder of the USB socket (its data sheet, SMT footprint)
 UNDER_SENSOR_mm = (-1.95, -1.95, 1.95, 1.95)  # its courtyard
 FONT = "(effects (font (size 0.7 0.7) (thickness 0.12))"
@@ -55,6 +55,7 @@ def screw(i, x, y):
     hole = f"(size {mould.SCREW_mm} {mould.SCREW_mm}) (drill {mould.SCREW_mm})"
     yield f'  (footprint "fingertip:screw" (layer "F.Cu") (at {at(x, y)}) (attr exclude_from_pos_files exclude_from_bom)'
     yield f'    (fp_text reference "H{i}" (at 0 0) (layer "F.Fab") hide {FONT}))'
+    yield from (f'    (fp_circle (center 0 0) (end {HEAD_mm} 0) (layer "{side}.CrtYd") (width 0.05) (fill none))' for side in "FB")
     yield f'    (pad "" np_thru_hole circle (at 0 0) {hole} (layers "*.Cu" "*.Mask")))'
 
 

@@ -61,8 +61,7 @@ def drawn(board, name):
         shown = {part: place for part, place in board.parts.items() if place[3] == back}
         lines += [sheet.rectangle(middle + side * x, y, w, h, "cut") for (part, _), (x, y, w, h, _) in board.pads.items() if part in shown]
         lines += [sheet.text(middle + side * x, y + 0.8, part, anchor="middle") for part, (x, y, *_) in shown.items()]
-    lines += plate(board, 2 * (right - left + 12))
-    lines += sheet.ruler(left, bottom + 8)
+    lines += plate(board, 2 * (right - left + 12)) + sheet.ruler(left, bottom + 8)
     return sheet.sheet(f"Circuit board of {name}, both sides, 1:1", left - 4, top - 8, 3 * (right - left) + 32, bottom - top + 22, lines)
 
 

@@ -95,6 +95,7 @@ COPPER = {
     "a via is missing": ("multiplexed", replaced(r"  \(via .*\n", "")),
     "a track between two lines": ("parallel", added(TRACK % ("91 81", "100 81", "F", 3))),
     "a track at the edge": ("multiplexed", added(TRACK % ("71.1 100", "71.1 110", "B", 2))),
+    "a track under a screw": ("parallel", added(TRACK % ("123.5 98", "123.5 102", "B", 2))),
     "wide tracks": ("multiplexed", replaced(r"\(width 0.25\)", "(width 0.5)", 0)),
     "a via under a sensor": ("parallel", added(VIA)),
     "a part on another": ("parallel", part("C4", moved(2, 0))),
@@ -105,7 +106,6 @@ COPPER = {
 FOLDERS = {json.loads(path.with_name("board.json").read_text(encoding="utf-8"))["bus"]: path for path in ROOT.glob("boards/*/pcb")}
 BOARDS = {bus: json.loads(folder.with_name("board.json").read_text(encoding="utf-8")) for bus, folder in FOLDERS.items()}
 TEXTS = {bus: next(folder.glob("*.kicad_pcb")).read_text(encoding="utf-8") for bus, folder in FOLDERS.items()}
-DRAWING, HERE = ROOT / "boards/drawing", pathlib.Path(__file__).parent
 
 
 def errors_of_boards():
@@ -166,12 +166,12 @@ class Copper(unittest.TestCase):
             shutil.copytree(FOLDERS[bus], folder / name)
             next((folder / name).glob("*.kicad_pcb")).write_text(plant(TEXTS[bus]), encoding="utf-8")
         boards = [next((folder / name).glob("*.kicad_pcb")) for name in plants]
-        lines = called.run("/usr/bin/python3", HERE / "kicad.py", *boards).splitlines()
+        lines = called.run("/usr/bin/python3", ROOT / "tests/checks/kicad.py", *boards).splitlines()
         judged = dict(zip(plants, map(json.loads, lines), strict=True))
         right = [judged.pop(f"none, {bus}") for bus in FOLDERS]
         found = errors_of_plants() | {name: sum(figures.values()) for name, figures in judged.items()}
         for run in ("one", "two"):
-            called.run("/usr/bin/python3", DRAWING / "fabricate.py", folder / run)
+            called.run("/usr/bin/python3", ROOT / "boards/drawing/fabricate.py", folder / run)
         sensors, boards = geometry.places(), {bus: pcb_check.Board(text) for bus, text in TEXTS.items()}
         errors = errors_of_boards()
         off = [off_um(folder / "one" / path.parent.name, boards[bus], sensors) for bus, path in FOLDERS.items()]
