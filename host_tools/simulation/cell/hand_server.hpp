@@ -12,10 +12,10 @@
 // A client that goes lifts what it pressed. Lines that a client does not take in time are lost.
 #pragma once
 
+#include "library/share/line_server.hpp"
 #include "simulation/cell/place.hpp"
 
 #include <array>
-#include <map>
 #include <optional>
 #include <string>
 
@@ -40,7 +40,7 @@ public:
   HandServer &operator=(const HandServer &) = delete;
 
   // Takes the clients' lines; does not wait.
-  void step();
+  void step() { lines_.step(); }
   // The hand on a fingertip, if any.
   const std::optional<HandAt> &hand(std::size_t finger) const { return hands_[finger].at; }
   // Whether the truth is due again. Host time.
@@ -53,19 +53,16 @@ private:
     int by = -1; // its client
   };
 
-  void come();
-  bool listen_to(int client, std::string &came); // false: it is gone
   // The answer; empty: none.
   std::string obey(int client, const std::string &line);
   void leave(int client);
 
   std::size_t fingertips_;
   bool obeys_;
-  std::string path_, name_;
-  int listening_ = -1;
-  std::map<int, std::string> clients_; // by descriptor: what came of their next line
+  std::string name_;
   std::array<Held, SIDES.size()> hands_;
   std::int64_t sent_us_ = 0;
+  LineServer lines_;
 };
 
 } // namespace fingertip::cell

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <optional>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 #include <vector>
 
@@ -39,22 +38,6 @@ std::vector<Simulated> find_simulated() {
     }
   }
   return all;
-}
-
-/* Of what is true there (simulation/cell/hand_server.hpp); -1: there is none. */
-int connect_to_truth() {
-  const std::string path = simulated_folder() + "/truth";
-  sockaddr_un address = {};
-  address.sun_family = AF_UNIX;
-  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (fd >= 0 && path.size() < sizeof address.sun_path) {
-    std::memcpy(address.sun_path, path.data(), path.size());
-    if (connect(fd, reinterpret_cast<const sockaddr *>(&address), sizeof address) == 0) {
-      return fd;
-    }
-  }
-  close(fd);
-  return -1;
 }
 
 HttpAnswer refusal(int status, const std::string &why) { return HttpAnswer(status, why + "\n"); }
@@ -90,7 +73,8 @@ std::optional<std::string> command_of(const std::string &body, const std::string
 /* A client's line, and its hand. */
 class Simulations::Session {
 public:
-  Session(const Simulated &one) : side_(one.side), line_(one.socket), truth_(connect_to_truth()) {}
+  Session(const Simulated &one)
+      : side_(one.side), line_(one.socket), truth_(connect_unix(simulated_folder() + "/truth")) {}
   ~Session() { close(truth_); }
 
   std::vector<pollfd> poll_descriptors() const { return line_.poll_descriptors(); }
@@ -106,7 +90,7 @@ public:
     return line_.write(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size());
   }
   const std::string &side() const { return side_; }
-  /* What is true now, as JSON; or why the command cannot be. */
+  /* What is true now (simulation/cell/hand_server.hpp), as JSON; or why the command cannot be. */
   std::string send_to_hand(const std::string &command, std::string *why_not) {
     if (!command.empty()) {
       (void)!::send(truth_, command.data(), command.size(), MSG_NOSIGNAL | MSG_DONTWAIT);

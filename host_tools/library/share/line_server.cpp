@@ -1,0 +1,95 @@
+#include "library/share/line_server.hpp"
+
+#include "libfingertip/descriptor_transport.hpp"
+#include "libfingertip/error.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <utility>
+
+namespace fingertip {
+
+namespace {
+
+constexpr std::size_t LONGEST_LINE = 200, MOST_CLIENTS = 16;
+
+void put(int client, const std::string &line) {
+  const std::string whole = line + "\n"; // the socket's room is many lines
+  (void)!send(client, whole.data(), whole.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+}
+
+} // namespace
+
+LineServer::LineServer(const std::string &path, Clients clients) : path_(path), about_(std::move(clients)) {
+  sockaddr_un address;
+  bool listens = unix_address(path_, &address);
+  if (listens) {
+    unlink(path_.c_str());
+    listening_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    const mode_t mask = umask(0177);
+    listens = listening_ >= 0 && bind(listening_, reinterpret_cast<const sockaddr *>(&address), sizeof address) == 0 &&
+              listen(listening_, MOST_CLIENTS) == 0;
+    umask(mask);
+  }
+  if (!listens) {
+    const Error error(ErrorCode::cannot_write, path_ + ": " + std::strerror(errno));
+    close(listening_);
+    throw error;
+  }
+}
+
+LineServer::~LineServer() {
+  for (const auto &client : clients_) {
+    close(client.first);
+  }
+  close(listening_);
+  unlink(path_.c_str());
+}
+
+void LineServer::step() {
+  for (int client; clients_.size() < MOST_CLIENTS &&
+                   (client = accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
+    clients_[client];
+  }
+  for (auto client = clients_.begin(); client != clients_.end();) {
+    if (hear(client->first, client->second)) {
+      ++client;
+      continue;
+    }
+    about_.leaves(client->first);
+    close(client->first);
+    client = clients_.erase(client);
+  }
+}
+
+bool LineServer::hear(int client, std::string &came) {
+  char bytes[1024];
+  for (ssize_t count; (count = recv(client, bytes, sizeof bytes, 0)) != 0;) {
+    if (count < 0) {
+      return errno == EAGAIN || errno == EINTR;
+    }
+    came.append(bytes, static_cast<std::size_t>(count));
+    for (std::size_t end; (end = came.find('\n')) != std::string::npos;) {
+      const std::string answer = about_.answer(client, came.substr(0, end));
+      if (!answer.empty()) {
+        put(client, answer);
+      }
+      came.erase(0, end + 1);
+    }
+    if (came.size() > LONGEST_LINE) {
+      return false;
+    }
+  }
+  return false;
+}
+
+void LineServer::send(const std::string &line) {
+  for (const auto &client : clients_) {
+    put(client.first, line);
+  }
+}
+
+} // namespace fingertip
