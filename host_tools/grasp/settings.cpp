@@ -23,7 +23,7 @@ constexpr double GENTLE_mm_s = 4.0; // approach to what breaks
 
 } // namespace
 
-#define OF(member) [](S &s) -> double & { return s.member; }
+#define OF(member) #member, [](S & s) -> double & { return s.member; }
 
 const std::vector<GraspSetting> &grasp_settings() {
   static const std::vector<GraspSetting> all = {
@@ -39,6 +39,8 @@ const std::vector<GraspSetting> &grasp_settings() {
       {"decay", "%/s", 0, 2000, 0.01, OF(decay_1_s), "How fast an excess of force decays"},
       {"rest", "s", 0, 60, 1, OF(rest_s), "No decay for this time after a slide"},
       {"pull", "N", 0.2, 20, 1, OF(pull_N), "Hand over when each fingertip is pulled so hard"},
+      {"mass", "kg", 0, 20, 1, OF(mass_kg), "Expected mass, which decides the first grip; 0: unknown"},
+      {"lift", "m/s2", 0, 20, 1, OF(lift_m_s2), "With --mass: acceleration of the arm as it lifts"},
       {"touch", "N", 0.02, 2, 1, OF(touch_N), "Force at which a touch begins"},
       {"approach", "mm/s", 0.5, 8, 1, OF(approach_mm_s), "Speed until the touch; slower where frames come late"},
       {"release", "mm/s", 0.5, 100, 1, OF(release_mm_s), "Speed of opening"},
@@ -47,12 +49,21 @@ const std::vector<GraspSetting> &grasp_settings() {
       {"late", "ms", 5, 500, 1e-3, OF(late_s), "Report frames that arrive older than this"},
       {"silent", "ms", 20, 5000, 1e-3, OF(silent_s), "Timeout of the gripper"},
       {"differ", "%", 5, 100, 0.01, OF(differ), "Warn if the fingertips' forces differ by more at rest"},
-      {"kp", "um/N", 0, 10000, 1e-3, OF(gains.kp_mm_N), "With --fixed: the published controller's proportional gain"},
+      {"kp", "um/N", 0, 10000, 1e-3, OF(gains.kp_mm_N),
+       "With --fixed: the published controller's proportional gain"},
       {"ki", "um/(N s)", 0, 100000, 1e-3, OF(gains.ki_mm_Ns), "Its gain of the integral"},
       {"kd", "um s/N", 0, 10000, 1e-3, OF(gains.kd_mm_s_N), "Its gain of the derivative"},
       {"control", "ms", 0.5, 1000, 1e-3, OF(control_s), "Time between two of its steps"},
   };
   return all;
+}
+
+std::string field_name(const GraspSetting &setting) { return std::string(split(setting.path, '.').back()); }
+
+const GraspSetting &setting_of_field(const std::string &name) {
+  const auto *found =
+      find_in(grasp_settings(), [&](const GraspSetting &setting) { return field_name(setting) == name; });
+  return found ? *found : throw Error(ErrorCode::bad_value, "no setting " + printable(name));
 }
 
 double value_of(const GraspSetting &setting, GripSettings settings) { return setting.field(settings) / setting.scale; }
@@ -76,6 +87,23 @@ std::map<std::string, double> preset_values(const std::string &preset) {
   }
   impossible("no preset " + printable(preset) + "; there are " +
              joined(grasp_presets(), ", ", [](const GraspPreset &one) { return one.name; }));
+}
+
+std::map<std::string, double> limits_of(const std::vector<std::string_view> &words) {
+  std::map<std::string, double> values;
+  for (const std::string_view word : words) {
+    const std::size_t equals = std::min(word.find('='), word.size());
+    const std::string_view name = word.substr(0, equals);
+    const auto value = to_double(word.substr(std::min(equals + 1, word.size())));
+    const auto *found = find_in(grasp_settings(), [&](const GraspSetting &each) { return name == each.name; });
+    if (!word.empty() && !(found && value)) {
+      impossible((found ? "the setting has no number: " : "the controller has no setting ") + printable(word));
+    }
+    if (found) {
+      values[found->name] = *value;
+    }
+  }
+  return values;
 }
 
 GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted) {

@@ -15,12 +15,16 @@ struct GraspSetting {
   const char *name; // of the option, without --
   const char *unit; // "" for a ratio
   double low, high;
-  double scale; // field = value * scale
+  double scale;     // field = value * scale
+  const char *path; // of the field: "gains.kp_mm_N"
   double &(*field)(GripSettings &settings);
   const char *help;
 };
 
 const std::vector<GraspSetting> &grasp_settings();
+// By the name of its field: "kp_mm_N". Throws Error, bad_value: there is none.
+std::string field_name(const GraspSetting &setting);
+const GraspSetting &setting_of_field(const std::string &name);
 
 double value_of(const GraspSetting &setting, GripSettings settings);
 
@@ -34,6 +38,9 @@ const std::vector<GraspPreset> &grasp_presets();
 // there is none.
 std::map<std::string, double> preset_values(const std::string &preset);
 std::map<std::string, double> breaking_values(double breaks_N);
+
+// Of NAME=VALUE each. Throws Error, bad_value.
+std::map<std::string, double> limits_of(const std::vector<std::string_view> &words);
 
 // Defaults of this gripper, overridden by the wanted values, by name. "fixed" chooses that mode.
 // Throws Error, code bad_value: a value out of range, or one that contradicts another; a gripper

@@ -27,6 +27,8 @@ constexpr State STATES[GRIP_STATES] = {
     {"fault", "fault; the width stays"},
 };
 
+constexpr const char *REQUESTS[GRIP_REQUESTS] = {"grasp", "hold", "release", "place", "hand_over"};
+
 struct Trouble {
   GripTrouble bit;
   const char *name, *text;
@@ -47,8 +49,8 @@ constexpr Trouble TROUBLES[] = {
     {GRIP_GRIPPER_FAULT, "gripper_fault", "the gripper reports a fault"},
     {GRIP_GRIPPER_INACTIVE, "gripper_inactive", "the gripper is not active"},
     {GRIP_NO_LOAD, "no_load", "no load can be estimated"},
-    {GRIP_FINGER_0_NO_FORCE, "finger_0_untold", "left: no force can be estimated"},
-    {GRIP_FINGER_1_NO_FORCE, "finger_1_untold", "right: no force can be estimated"},
+    {GRIP_FINGER_0_NO_FORCE, "finger_0_no_force", "left: no force can be estimated"},
+    {GRIP_FINGER_1_NO_FORCE, "finger_1_no_force", "right: no force can be estimated"},
     {GRIP_FINGER_0_LATE, "finger_0_late", "left: late"},
     {GRIP_FINGER_1_LATE, "finger_1_late", "right: late"},
     {GRIP_FINGER_0_EMPTY, "finger_0_empty", "left: reports nothing, while the other is pressed"},
@@ -69,6 +71,13 @@ std::string state_text(std::uint8_t state) { return state < GRIP_STATES ? STATES
 
 bool is_end_state(std::uint8_t state) {
   return state == GRIP_OPEN || state == GRIP_DROPPED || state == GRIP_MISSED || state == GRIP_FAULT;
+}
+
+const char *request_name(GripRequest request) { return REQUESTS[request]; }
+
+std::optional<GripRequest> request_of_name(std::string_view name) {
+  const auto *found = find_in(REQUESTS, [&](const char *each) { return name == each; });
+  return found ? std::optional(static_cast<GripRequest>(found - REQUESTS)) : std::nullopt;
 }
 
 std::string trouble_names(std::uint32_t trouble) {

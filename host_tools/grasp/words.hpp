@@ -19,6 +19,10 @@ std::string state_text(std::uint8_t state);
 // Final states, in which nothing goes on by itself: open, dropped, missed, fault.
 bool is_end_state(std::uint8_t state);
 
+// "hand_over"
+const char *request_name(GripRequest request);
+std::optional<GripRequest> request_of_name(std::string_view name);
+
 // "finger_0_stale at_cap"; "" for none
 std::string trouble_names(std::uint32_t trouble);
 // Nothing where a word is none of them.

@@ -40,7 +40,7 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
     now_s += draw(input, 0.0, 0.02);
     const std::uint8_t what = fuzz_u8(&input);
     if (what % 4 == 0) {
-      grip.request(static_cast<GripRequest>(what / 4 % 3));
+      grip.request(static_cast<GripRequest>(what / 4 % GRIP_REQUESTS));
     } else if (what % 4 == 1) {
       GripperStatus status;
       status.host_us = std::llround(1e6 * (now_s - draw(input, 0.0, 0.1)));

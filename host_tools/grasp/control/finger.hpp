@@ -2,6 +2,7 @@
 #pragma once
 
 #include "grasp/control/settings.hpp"
+#include "grasp/fingertip_grip.h"
 
 #include <array>
 #include <cmath>
@@ -22,32 +23,7 @@ struct GripTouch {
   double speed_x_mm_s = 0.0, speed_y_mm_s = 0.0; // of the contact on the rubber
 };
 
-// Bits. Each is on while its trouble lasts; those that led to GRIP_FAULT stay on.
-enum GripTrouble : std::uint32_t {
-  GRIP_FINGER_0_STALE = 1u << 0, // no new frame for settings.stale_s
-  GRIP_FINGER_1_STALE = 1u << 1,
-  GRIP_FINGER_0_FROZEN = 1u << 2, // frames whose values never change
-  GRIP_FINGER_1_FROZEN = 1u << 3,
-  GRIP_FINGER_0_FORCE_ONLY = 1u << 4, // the tangential force is not trusted: UNCERTAIN, FLAT...
-  GRIP_FINGER_1_FORCE_ONLY = 1u << 5,
-  GRIP_FINGER_0_OVER = 1u << 6, // SATURATED or FORCE_LOWER_BOUND: never tightens further
-  GRIP_FINGER_1_OVER = 1u << 7,
-  GRIP_FINGERS_DIFFER = 1u << 8,     // forces by more than settings.differ while the gripper rests
-  GRIP_AT_CAP = 1u << 9,             // the wanted force exceeds cap_N
-  GRIP_AT_TRAVEL_CAP = 1u << 10,     // the wanted width is further than travel_cap_mm from the touch
-  GRIP_GRIPPER_SILENT = 1u << 11,    // no status for settings.silent_s
-  GRIP_GRIPPER_FAULT = 1u << 12,     // its own code in the report
-  GRIP_GRIPPER_INACTIVE = 1u << 13,  // it was activated and is no longer
-  GRIP_NO_LOAD = 1u << 14,           // mode hold: no fingertip reports a load; the grip does not loosen
-  GRIP_FINGER_0_NO_FORCE = 1u << 15, // frames, but none with a measured force
-  GRIP_FINGER_1_NO_FORCE = 1u << 16,
-  GRIP_FINGER_0_LATE = 1u << 17, // frames older than settings.late_s when they come
-  GRIP_FINGER_1_LATE = 1u << 18,
-  GRIP_FINGER_0_EMPTY = 1u << 19, // no contact in a hold, while the other has more than twice touch_N
-  GRIP_FINGER_1_EMPTY = 1u << 20,
-  GRIP_NO_GRIP = 1u << 21, // squeezed for 3 s, and less than half of the wanted force has come
-};
-
+using GripTrouble = fingertip_grip_trouble;
 constexpr std::uint32_t GRIP_GRIPPER_FAULTS = GRIP_GRIPPER_FAULT | GRIP_GRIPPER_INACTIVE;
 
 // The present reading of one fingertip.

@@ -14,6 +14,7 @@ constexpr double RAMP_s = 0.1;
 constexpr double SQUEEZE_s = 3.0; // squeezing ends after this time with the force that it reached
 constexpr double SQUEEZED = 0.8;  // share of the start force that is enough
 constexpr double TAKEN = 0.2;     // share of the load that a table has left: it is placed
+constexpr double BELOW_CAP = 0.9; // of a cap that was lowered below the force: where to open to
 constexpr double HALF = 0.5;      // a smaller share is no grip
 constexpr double ACTIVATION_s = 10.0;
 constexpr double EMPTY_s = 0.06;  // without any contact for this time the object is gone
@@ -106,8 +107,17 @@ bool Grip::request(GripRequest request) {
     holds_ = request == GRIP_REQUEST_PLACE ? GRIP_PLACING : GRIP_HANDING;
     enter(holds_);
     return true;
+  default:
+    return false;
   }
-  return false;
+}
+
+bool Grip::change(const GripSettings &settings) {
+  if (settings.mode != settings_.mode) {
+    return false;
+  }
+  settings_ = settings;
+  return true;
 }
 
 std::uint32_t Grip::gripper_trouble() {
@@ -125,7 +135,7 @@ std::uint32_t Grip::gripper_trouble() {
 double Grip::dead_s() const { return readings_.delay_s + traits_.latency_s + reach_.poll_s(); }
 
 double Grip::start_force() const {
-  return settings_.mode == GRIP_MODE_FIXED ? settings_.set_N : is_blind_ ? settings_.blind_N : settings_.start_N;
+  return settings_.mode == GRIP_MODE_FIXED ? settings_.set_N : is_blind_ ? settings_.unseen_N() : settings_.first_N();
 }
 
 // Moves the width towards to_mm, as far as this speed allows since the last step.
@@ -184,7 +194,8 @@ void Grip::approach() {
 
 std::uint32_t Grip::aim(const GripAim &aim) {
   GripAim below = aim;
-  wanted_N_ = below.wanted_N = std::min(aim.wanted_N, settings_.cap_N);
+  wanted_N_ = below.wanted_N =
+      std::min(aim.wanted_N, readings_.high_N > settings_.cap_N ? BELOW_CAP * settings_.cap_N : settings_.cap_N);
   return (aim.wanted_N >= settings_.cap_N ? GRIP_AT_CAP : 0u) | reach_.aim(below, readings_, settings_, now_s_);
 }
 
@@ -197,7 +208,7 @@ std::uint32_t Grip::squeeze() {
   if (alone) {
     reach_.both_touch(readings_.t_s);
   }
-  const double from_N = is_blind_ ? settings_.start_N : settings_.touch_N;
+  const double from_N = is_blind_ ? settings_.first_N() : settings_.touch_N;
   const double risen_N = from_N + (aimed_N - from_N) * std::min((now_s_ - since_s_) / RISES_s, 1.0);
   const std::uint32_t trouble = fixed ? fixed_.step(readings_, settings_, traits_, now_s_, reach_)
                                       : aim({risen_N, GripAim::Haste::patient, settings_.sets_force()});
@@ -386,7 +397,7 @@ GripReport Grip::report() const {
   report.gripper_fault = failed ? fault_code_ : status_.fault;
   report.wanted_N = wanted_N_;
   report.force_N = readings_.grip_N;
-  report.finger_N = readings_.force_N;
+  std::copy(readings_.force_N.begin(), readings_.force_N.end(), report.finger_N);
   report.friction = hold_.friction(settings_);
   report.width_mm = status_.width_mm;
   report.delay_s = readings_.delay_s;

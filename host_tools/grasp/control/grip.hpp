@@ -29,58 +29,15 @@
 
 namespace fingertip {
 
-// The motion that the gripper is asked for.
-enum GripMotion : std::uint8_t {
-  GRIP_STAY,     // hold the position: only keep the line alive
-  GRIP_ACTIVATE, // only while nothing is gripped
-  GRIP_MOVE,
-};
 struct GripCommand : GripperMove {
-  std::uint8_t motion = GRIP_STAY; // GripMotion
+  std::uint8_t motion = GRIP_STAY; // fingertip_grip_motion
 };
 
-// The phases of a grasp follow Romano et al., "Human-inspired robotic grasp control with tactile
-// sensing", IEEE Trans. Robotics 27, 2011.
-enum GripState : std::uint8_t {
-  GRIP_IDLE, // no request yet
-  GRIP_ACTIVATING,
-  GRIP_APPROACH, // closing until both fingertips have contact
-  GRIP_SQUEEZE,  // closing until the start force is reached
-  GRIP_READY,    // the start force is reached; the zero of the load is measured
-  GRIP_HOLDING,
-  GRIP_SLIPPING, // as HOLDING, while the object slides
-  GRIP_PLACING,  // as HOLDING, until a table has taken the load: then RELEASE
-  GRIP_HANDING,  // as HOLDING, until someone pulls: then RELEASE
-  GRIP_STILL,    // the width stays, on request
-  GRIP_RELEASE,  // opening, on request
-  GRIP_OPEN,     // opened
-  GRIP_DROPPED,  // the object is gone; the width stays
-  GRIP_MISSED,   // closed without an object
-  GRIP_FAULT,    // the width stays
-  GRIP_STATES,
-};
+using GripState = fingertip_grip_state;
+using GripRequest = fingertip_grip_request;
 
-enum GripRequest {
-  GRIP_REQUEST_GRASP,
-  GRIP_REQUEST_HOLD,
-  GRIP_REQUEST_RELEASE,
-  GRIP_REQUEST_PLACE,
-  GRIP_REQUEST_HAND_OVER,
-};
-
-struct GripReport {
-  std::uint8_t state = GRIP_IDLE;              // GripState
-  std::uint32_t trouble = 0;                   // GripTrouble
-  std::uint8_t gripper_fault = 0;              // the gripper's own code; in FAULT the last one stays
-  double wanted_N = 0.0;                       // grip force that the controller aims at
-  double force_N = 0.0;                        // grip force, from both fingertips
-  std::array<double, GRIP_FINGERS> finger_N{}; // force of each fingertip
-  double load_N = 0.0;                         // tangential force at one fingertip since READY; 0: unknown
-  double margin = 0.0;                         // force x friction / load; 0: no load
-  double friction = 0.0;
-  double width_mm = 0.0;
-  double delay_s = 0.0;     // from a fingertip's measurement to the controller
-  std::uint32_t slides = 0; // slides since GRASP
+struct GripReport : fingertip_grip_report {
+  GripReport() : fingertip_grip_report() {}
 };
 
 class Grip {
@@ -96,6 +53,9 @@ public:
   // state. PLACE and HAND_OVER: from HOLDING in mode hold, PLACE with a load of 0.15 N and more: until it opens, a
   // load against the present one, or a pull, does not raise the grip. HOLD ends them.
   bool request(GripRequest request);
+
+  // Other settings from the next step on, in any state. False: their mode is another; nothing changes.
+  bool change(const GripSettings &settings);
 
   // Computes the command. Call it after every input, and every 10 ms without one.
   GripReport step(double now_s, GripCommand &command);

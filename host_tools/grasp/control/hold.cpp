@@ -83,7 +83,8 @@ void GripLoad::slides_at(double load_N, double speed_mm_s, double passed_s) {
 void GripHold::begin() { *this = GripHold(); }
 
 double GripHold::need_N(const GripSettings &settings, double delay_s, double dead_s) const {
-  const double load_N = sliding_ ? load_.now_N() : std::max(load_.ahead_N(dead_s), was_N_);
+  const double load_N =
+      sliding_ ? load_.now_N() : std::max({load_.ahead_N(dead_s), was_N_, settings.expected_N(was_loaded_)});
   const double margin = settings.margin + MARGIN_1_s * late_s(delay_s);
   return (slides_ > 0 ? settings.slid : 1.0) * margin * load_N / friction(settings);
 }
@@ -141,9 +142,9 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
     update(readings, settings, now_s);
   }
   const double late_N = settings.sets_force() ? 0.0 : FLOOR_N_s * late_s(readings.delay_s);
-  const double least_N = !has_seen_load_ && !readings.has_load ? settings.blind_N
+  const double least_N = !has_seen_load_ && !readings.has_load ? settings.unseen_N()
                          : was_loaded_                         ? settings.floor_N + late_N
-                                                               : settings.start_N;
+                                                               : settings.first_N();
   double need = std::max(need_N(settings, readings.delay_s, dead_s), least_N);
   if (goes_on_ && !readings.has_load) {
     need = std::max(need, MORE * readings.grip_N);

@@ -43,11 +43,20 @@ struct GripSettings {
   double decay_1_s = 5.0; // share of an excess of grip that decays in a second
   double pull_N = 0.6;    // HAND_OVER: the load of a fingertip changes by so much
   double rest_s = 0.3;    // no decay for this time after a slide
+  double mass_kg = 0.0;   // expected mass of the object: the load is taken to be its weight at least; 0: unknown
+  double lift_m_s2 = 1.0; // acceleration that the expected mass gets before the load is known
+  // Load of one fingertip by the expected mass.
+  double expected_N(bool is_loaded) const { return 0.5 * mass_kg * (9.81 + (is_loaded ? 0.0 : lift_m_s2)); }
+  // Grip before there is a load; grip if none can be estimated.
+  double first_N() const {
+    return mass_kg > 0.0 ? std::min(std::max(margin * expected_N(false) / friction, floor_N), cap_N) : start_N;
+  }
+  double unseen_N() const { return std::max(blind_N, first_N()); }
   // A set force: the same grip at the start, later and without a load. While there is no load, the
   // controller holds the nearest force that the gripper reaches, not the least that is enough.
   // Forces this far apart are alike.
   double alike_N(double force_N) const { return std::max(differ * force_N, 2.0 * touch_N); }
-  bool sets_force() const { return start_N == floor_N && start_N == blind_N; }
+  bool sets_force() const { return start_N == floor_N && start_N == blind_N && mass_kg == 0.0; }
 };
 
 GripSettings default_settings(const GripperTraits &traits);

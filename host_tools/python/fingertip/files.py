@@ -33,6 +33,7 @@ import numpy.typing as npt
 from . import line, recorded
 from .errors import InputError
 from .frames import Edge, frame_of
+from .grip_table import State
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
 from .mcap_recording import MAGIC, Contacts, Damaged, Line, McapLineReader
 from .recorded import Array, Rows, counts_of, judge_key, packet_of
@@ -604,7 +605,7 @@ def read_recording(
 
 
 GRIP_WORDS = ("state", "trouble")  # its columns that are names
-GRIP_STATES = "idle activating approach squeeze ready holding slipping placing handing still release open dropped missed fault".split()
+GRIP_STATES = [state.name.lower() for state in State]
 GRIP_ROW = "# grip: "
 
 

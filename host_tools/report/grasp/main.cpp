@@ -39,32 +39,11 @@ constexpr Wrong WRONG[] = {{"none", Fault::Kind::nothing, 1e-9}, {"frame", Fault
 
 struct Options {
   std::string kind = "usual", gripper = gripper_models().front().model, controller = "ours", settings, wrong;
-  double later_ms = 0.0, rate_Hz = 410.0, load_share = 1.0, still_s = 0.0;
+  double later_ms = 0.0, rate_Hz = 410.0, load_share = 1.0, still_s = 0.0, mass_share = 0.0;
   std::uint64_t seed = 1, count = 100, jobs = 2;
   std::optional<std::uint64_t> trace;
   bool faults = false;
 };
-
-// Of name=value, split by commas, as grasp_settings() has them.
-std::map<std::string, double> settings_of(const std::string &changes) {
-  std::map<std::string, double> values;
-  for (const std::string_view one : split(changes, ',')) {
-    if (one.empty()) {
-      continue;
-    }
-    const std::size_t equals = one.find('=');
-    const std::string name(one.substr(0, equals));
-    const auto value = equals == std::string_view::npos ? std::nullopt : to_double(one.substr(equals + 1));
-    if (!find_in(grasp_settings(), [&](const GraspSetting &each) { return name == each.name; })) {
-      throw std::runtime_error("the controller has no setting \"" + name + "\"");
-    }
-    if (!value) {
-      throw std::runtime_error("the setting " + name + " has no number");
-    }
-    values[name] = *value;
-  }
-  return values;
-}
 
 KindTrial trial_of(const Options &options, std::uint64_t n) {
   const auto kinds = split(options.kind, ',');
@@ -110,7 +89,10 @@ GripSettings settings_with(const Options &options, const KindTrial &trial) {
     values["fixed"] = still ? trial.set_N : options.controller == "fixed" ? FIXED_N : PAPER_N;
     values.erase("cap");
   }
-  for (const auto &[name, value] : settings_of(options.settings)) {
+  if (options.mass_share > 0.0) {
+    values["mass"] = options.mass_share * trial.grasp.mass_kg;
+  }
+  for (const auto &[name, value] : limits_of(split(options.settings, ','))) {
     values[name] = value;
   }
   GripSettings settings = settings_for(trial.gripper.traits, values);
@@ -225,6 +207,7 @@ int run(int argc, char **argv) {
       ->check(CLI::IsMember({"ours", "textbook", "fixed", "paper"}))
       ->capture_default_str();
   app.add_option("--set", options.settings, "Of our settings, split by commas: margin=1.4")->type_name("NAME=VALUE");
+  app.add_option("--mass", options.mass_share, "Expected mass, of the true one")->check(CLI::NonNegativeNumber);
   app.add_option("--later", options.later_ms, "All frames come later")->check(CLI::NonNegativeNumber)->type_name("MS");
   app.add_option("--rate", options.rate_Hz, "Frames of a fingertip")
       ->check(CLI::Range(1.0, 1600.0))

@@ -21,7 +21,7 @@ EXAMPLE = ROOT / "host_tools/library/libfingertip/example"
 TOOLS = argparse.Namespace()
 PATIENCE_s = 300
 PUBLIC = set(
-    """clock.hpp clock_fit.hpp command.hpp connection.hpp decoder.hpp device_loop.hpp discovery.hpp error.hpp fingertip.h line_source.hpp
+    """clock.hpp clock_fit.hpp command.hpp connection.hpp decoder.hpp device_loop.hpp discovery.hpp error.hpp fingertip.h fingertip_grip.h line_source.hpp
     names.hpp packet_fields.hpp packet_file.hpp recording_reader.hpp session.hpp transport.hpp wire.hpp common/calibration.h
     common/contact_flags.h common/crash.h common/limits.h common/pad_profile.h common/status.h wire/bodies.h wire/packet.h""".split()
 )
@@ -123,7 +123,7 @@ class Install(unittest.TestCase):
         symbols = run("nm", "-DC", "--defined-only", self.library)
         ours = {part for name in re.findall(r"^\S+ [TDR] ((?:\w+::)*\w+)", symbols, re.M) for part in name.split("::")}
         public = """Session Decoder DeviceLoop PacketFile RecordingReader choose_way open_way find_usb command_stream setting_from_text
-            flags_text warning_flags info_metadata wire_encode wire_decode fingertip_decoder_feed fingertip_reader_next fingertip_writer_new"""
+            flags_text warning_flags info_metadata wire_encode wire_decode fingertip_decoder_feed fingertip_reader_next fingertip_writer_new fingertip_grip_step"""
         own = "SerialTransport UsbTransport RecordingWriter ProgressBar OutputFile read_firmware printable"
         self.assertLessEqual(set(public.split()), ours)
         self.assertFalse(set(own.split()) & ours)

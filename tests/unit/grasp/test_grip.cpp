@@ -304,3 +304,44 @@ TEST(Grip, HandsOverWhatIsGone) {
   world.run(0.2);
   EXPECT_EQ(world.report.state, GRIP_RELEASE);
 }
+
+TEST(Grip, SettingsChangeWhileItHolds) {
+  GripWorld world;
+  world.grasp();
+  world.pull(4.0, 0.3);
+  world.run(1.0);
+  EXPECT_GT(world.force_N, 7.0);
+  ASSERT_TRUE(world.grip.change(settings_for(world.traits, {{"cap", 5}})));
+  world.run(1.0);
+  EXPECT_LT(world.force_N, 5.0);
+  EXPECT_GT(world.force_N, 4.0);
+  EXPECT_TRUE(world.report.trouble & GRIP_AT_CAP);
+  EXPECT_FALSE(world.grip.change(settings_for(world.traits, {{"fixed", 5}})));
+  ASSERT_TRUE(world.grip.change(world.settings));
+  world.pull(5.0, 0.3);
+  world.run(0.5);
+  EXPECT_GT(world.force_N, 5.2);
+  EXPECT_FALSE(world.report.trouble & GRIP_AT_CAP);
+}
+
+TEST(Grip, AnExpectedMassDecidesTheFirstGrip) {
+  constexpr double MASS_kg = 0.6, LIFT_m_s2 = 2.0;
+  for (const bool is_seen : {true, false}) {
+    GripWorld world({{"mass", MASS_kg}, {"lift", LIFT_m_s2}, {"blind", 5}});
+    world.drop_flags = {is_seen ? 0u : std::uint32_t{CONTACT_FLAG_TANGENTIAL_VALID}};
+    world.drop_flags[1] = world.drop_flags[0];
+    world.grasp();
+    expect_share(world.settings.margin * MASS_kg * (9.81 + LIFT_m_s2) / (2.0 * world.settings.friction), world.force_N,
+                 0.08);
+  }
+  GripWorld world({{"mass", 0.02}});
+  world.grasp();
+  expect_share(world.settings.floor_N, world.force_N, 0.15);
+  world.pull(0.5, 0.3);
+  world.run(2.0);
+  const double before_N = world.force_N;
+  ASSERT_TRUE(world.grip.change(settings_for(world.traits, {{"mass", 1.0}})));
+  world.run(0.5);
+  EXPECT_GT(world.force_N, 1.0 * 9.81 / 2.0 / world.report.friction);
+  EXPECT_GT(world.force_N, 2.0 * before_N);
+}

@@ -40,7 +40,7 @@ TEST(Words, EveryTroubleHasAName) {
 TEST(Words, TroublesHaveTheirNumbers) {
   GripReport report;
   report.trouble = GRIP_FINGERS_DIFFER | GRIP_FINGER_1_LATE;
-  report.finger_N = {3.1, 4.6};
+  report.finger_N[0] = 3.1, report.finger_N[1] = 4.6;
   report.delay_s = 0.061;
   const auto texts = trouble_texts(report);
   ASSERT_EQ(texts.size(), 2u);

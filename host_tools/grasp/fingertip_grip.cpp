@@ -1,0 +1,147 @@
+#include "grasp/fingertip_grip.h"
+
+#include "grasp/convert.hpp"
+#include "grasp/settings.hpp"
+#include "grasp/words.hpp"
+#include "libfingertip/fingertip_values.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+using namespace fingertip;
+using namespace fingertip::values;
+
+namespace {
+
+GripperTraits traits_of(const fingertip_grip_traits &given) {
+  const double all[] = {given.stroke_mm,      given.step_mm,     given.speed_min_mm_s,
+                        given.speed_max_mm_s, given.deadband_mm, given.force_min_N,
+                        given.force_max_N,    given.latency_s,   given.poll_s};
+  for (const double &value : all) {
+    if (!(std::isfinite(value) && value >= 0.0 && (value > 0.0 || &value - all >= 4))) {
+      throw Error(ErrorCode::bad_value,
+                  "a gripper's traits are numbers of at least 0; stroke, step and speeds above 0");
+    }
+  }
+  return {"gripper",         given.stroke_mm,      given.step_mm,
+          given.deadband_mm, given.speed_min_mm_s, given.speed_max_mm_s,
+          given.force_min_N, given.force_max_N,    given.latency_s,
+          given.poll_s};
+}
+
+GripSettings settings_of(const GripperTraits &traits, const char *const *names, const double *values, size_t count) {
+  std::map<std::string, double> wanted;
+  for (std::size_t i = 0; i < count; i++) {
+    const GraspSetting &setting = setting_of_field(names[i]);
+    wanted[setting.name] = values[i] / setting.scale;
+  }
+  try {
+    return settings_for(traits, wanted);
+  } catch (const Error &error) {
+    std::string text = error.what(); // it has the names of options
+    for (const GraspSetting &setting : grasp_settings()) {
+      const std::string option = std::string("--") + setting.name;
+      for (std::size_t at = 0; (at = text.find(option, at)) != std::string::npos;) {
+        text.replace(at, option.size(), field_name(setting));
+      }
+    }
+    throw Error(error.code(), text);
+  }
+}
+
+fingertip_status null() { return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL"); }
+
+} // namespace
+
+struct fingertip_grip {
+  GripperTraits traits;
+  GripSettings settings;
+  Grip grip;
+};
+
+struct fingertip_grip *fingertip_grip_new(const struct fingertip_grip_traits *traits, const char *const *names,
+                                          const double *values, size_t count) {
+  fingertip_grip *made = nullptr;
+  guarded([&] {
+    const GripperTraits own = traits_of(*traits);
+    const GripSettings settings = settings_of(own, names, values, count);
+    made = new fingertip_grip{own, settings, Grip(settings, own)};
+    return FINGERTIP_OK;
+  });
+  return made;
+}
+
+void fingertip_grip_free(struct fingertip_grip *grip) { delete grip; }
+
+enum fingertip_status fingertip_grip_set(struct fingertip_grip *grip, const char *const *names, const double *values,
+                                         size_t count) {
+  return guarded([&] {
+    const GripSettings settings = settings_of(grip->traits, names, values, count);
+    if (!grip->grip.change(settings)) {
+      return failed(FINGERTIP_ERR_VALUE, "the mode cannot change: set_N chooses it at the beginning");
+    }
+    grip->settings = settings;
+    return FINGERTIP_OK;
+  });
+}
+
+enum fingertip_status fingertip_grip_setting(const struct fingertip_grip *grip, const char *name, double *value) {
+  return guarded([&] {
+    GripSettings settings = grip->settings;
+    *value = setting_of_field(name).field(settings);
+    return FINGERTIP_OK;
+  });
+}
+
+enum fingertip_status fingertip_grip_take_contact(struct fingertip_grip *grip, size_t finger, double t_s,
+                                                  const double *values, size_t count) {
+  return guarded([&] {
+    if (!grip || !values || finger >= GRIP_FINGERS || count != count_of(WIRE_CONTACT) || !(t_s >= 0.0)) {
+      return failed(FINGERTIP_ERR_ARGUMENT, "give a contact packet's numbers, finger 0 or 1, and a time");
+    }
+    double numbers[FINGERTIP_VALUES_MOST];
+    std::replace_copy_if(
+        values, values + count, numbers, [](double value) { return !std::isfinite(value); }, 0.0);
+    grip->grip.take(finger, touch_from_packet(packet_of(WIRE_CONTACT, numbers, count), 1e6 * t_s));
+    return FINGERTIP_OK;
+  });
+}
+
+enum fingertip_status fingertip_grip_take_answer(struct fingertip_grip *grip,
+                                                 const struct fingertip_grip_answer *answer) {
+  if (!grip || !answer || !(answer->t_s >= 0.0) || !std::isfinite(answer->width_mm)) {
+    return failed(FINGERTIP_ERR_ARGUMENT, "an answer has a time and a width");
+  }
+  GripperStatus status;
+  status.host_us = std::llround(1e6 * answer->t_s);
+  status.active = answer->active != 0;
+  status.moving = answer->moving != 0;
+  status.width_mm = answer->width_mm;
+  status.fault = answer->fault;
+  grip->grip.take(status);
+  return FINGERTIP_OK;
+}
+
+enum fingertip_status fingertip_grip_ask(struct fingertip_grip *grip, enum fingertip_grip_request request) {
+  return !grip ? null() : grip->grip.request(request) ? FINGERTIP_OK : FINGERTIP_END;
+}
+
+enum fingertip_status fingertip_grip_step(struct fingertip_grip *grip, double now_s,
+                                          struct fingertip_grip_command *command,
+                                          struct fingertip_grip_report *report) {
+  if (!grip || !command || !report || !(now_s >= 0.0)) {
+    return failed(FINGERTIP_ERR_ARGUMENT, "give a time, and where to write command and report");
+  }
+  GripCommand out;
+  *report = grip->grip.step(now_s, out);
+  *command = {out.width_mm, out.speed_mm_s, out.force_N, out.motion};
+  return FINGERTIP_OK;
+}
+
+size_t fingertip_grip_state_name(uint8_t state, char *text, size_t size) {
+  return put_text(state_name(state), text, size);
+}
+
+size_t fingertip_grip_trouble_names(uint32_t trouble, char *text, size_t size) {
+  return put_text(trouble_names(trouble), text, size);
+}
