@@ -82,6 +82,11 @@ bool GraspLoop::request(GripRequest wanted) {
   return core_->request(wanted);
 }
 
+bool GraspLoop::change(const GripSettings &settings) {
+  std::lock_guard lock(core_mutex_);
+  return core_->change(settings);
+}
+
 std::vector<GraspNews> GraspLoop::take(milliseconds timeout) {
   std::unique_lock lock(news_mutex_);
   for (const HostTime limit = host_now() + timeout; news_.empty() && host_now() < limit;) {

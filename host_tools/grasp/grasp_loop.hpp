@@ -92,6 +92,8 @@ public:
   void begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen, const GripSettings &settings);
   // False: not from this state.
   bool request(GripRequest wanted);
+  // Grip::change.
+  bool change(const GripSettings &settings);
   // All there is, waiting at most this long for the first.
   std::vector<GraspNews> take(std::chrono::milliseconds timeout);
   // The width stays, streams end; news come until the one of kind ended.

@@ -76,6 +76,8 @@ std::string share_socket_name(const std::string &serial) { return as_name(serial
 
 std::string share_port_name(const std::string &serial) { return as_name(serial) + PORT_END; }
 
+std::string grasp_socket_name(const std::string &serial) { return as_name(serial) + ".grasp"; }
+
 std::vector<Shared> find_shared() {
   std::vector<std::string> folders = {own_share_folder()};
   if (folders[0] != COMMON_SHARE_FOLDER) {

@@ -39,6 +39,8 @@ std::string port_of(const std::string &path);
 
 std::string share_socket_name(const std::string &serial);
 std::string share_port_name(const std::string &serial);
+/* Beside them: where `fingertip grasp` takes requests, by its left fingertip's serial number. */
+std::string grasp_socket_name(const std::string &serial);
 
 class SocketTransport : public DescriptorTransport {
 public:

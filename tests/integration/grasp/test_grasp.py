@@ -9,6 +9,7 @@ import os
 import pathlib
 import resource
 import signal
+import socket
 import subprocess
 import sys
 import unittest
@@ -230,6 +231,36 @@ class Course(GraspTest):
             recording = files.read_recording(self.csv, serial="AAAA", salvage=True)
             self.assertGreater(len(recording["t_us"]), 50)
             self.assertEqual(recording.end, {})
+
+    def test_another_program_asks(self):
+        with self.cell():
+            process = self.start("--quiet", "-o", self.csv, stderr=subprocess.STDOUT)
+            self.until_state(process, "holding")
+            self.tell("load 2")
+            self.steady()
+            client = self.enterContext(socket.socket(socket.AF_UNIX))
+            client.connect(f"{self.folder}/fingertip/AAAA.grasp")
+
+            def ask(line):
+                client.sendall(line.encode() + b"\n")
+                self.world.wait([client.fileno()])
+                return client.recv(4096).decode()
+
+            self.assertRegex(ask("report"), r"^report state=holding trouble=\S* width_mm=[\d.]+ .*load_N=1\.0\d")
+            before_N = self.steady()[1]
+            self.assertEqual(ask("mass=1.5"), "ok\n")
+            self.assertGreater(self.steady()[1], 1.5 * before_N)
+            self.assertIn("cap is not possible", ask("cap=500"))
+            self.assertIn("nonsense", ask("nonsense"))
+            self.assertEqual(ask("mass=0 place"), "ok\n")
+            self.world.wait([client.fileno()])
+            self.assertEqual(client.recv(4096), b"state placing\n")
+            self.assertIn("error cannot be while it is placing", ask("place"))
+            self.tell("load 0")
+            self.until_state(process, "open")
+            process.terminate()
+            self.assertEqual(process.wait(), 0)
+        self.assertIn("request mass=0 place", self.events())
 
 
 class Trouble(GraspTest):

@@ -11,7 +11,9 @@
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/packet_file.hpp"
+#include "libfingertip/share_socket.hpp"
 #include "libfingertip/text.hpp"
+#include "library/share/line_server.hpp"
 #include "tool/advice.hpp"
 #include "tool/cli/command_line.hpp"
 #include "tool/cli/gripper_options.hpp"
@@ -99,8 +101,8 @@ std::array<Way, FINGERS> ways_of(const GraspOptions &options) {
 
 class GraspSession {
 public:
-  GraspSession(const GraspOptions &options, const GripSettings &settings)
-      : options_(options), settings_(settings), models_(FINGERS),
+  GraspSession(const GraspOptions &options, const std::map<std::string, double> &limits, const GripSettings &settings)
+      : options_(options), limits_(limits), settings_(settings), models_(FINGERS),
         loop_(ways_of(options), {WIRE_STREAM_ALL, options.activate, interrupts}) {
     grip_.set_gripper(options.gripper.model);
     grip_.set_cap_N(static_cast<float>(settings.cap_N));
@@ -119,6 +121,9 @@ public:
     }
     while (!take_news()) {
       answer_interrupts();
+      if (requests_) {
+        requests_->step();
+      }
       show();
       if (!ending_ && should_end()) {
         ending_ = true;
@@ -169,6 +174,55 @@ private:
     }
     loop_.begin(
         std::move(gripper), [way] { return open_gripper(way); }, settings_);
+    try {
+      make_own_folder(own_share_folder());
+      requests_.emplace(own_share_folder() + "/" + grasp_socket_name(text_field(ready[0].packet.body.info.serial)),
+                        LineServer::Clients{[this](int, const std::string &asked) { return answer(asked); }});
+    } catch (const Error &error) {
+      lost_ = "takes no requests: " + error_text(error);
+    }
+  }
+
+  /* A line of another program: NAME=VALUE, any number of them, then a request if there is one; or "report". */
+  std::string answer(const std::string &line) {
+    if (line == "report") {
+      return report_line();
+    }
+    std::vector<std::string_view> words = split(trim(line), ' ');
+    const std::optional<GripRequest> request = request_of_name(words.back());
+    words.resize(words.size() - (request ? 1 : 0));
+    event("request " + line);
+    try {
+      std::map<std::string, double> limits = limits_of(words);
+      limits.insert(limits_.begin(), limits_.end());
+      return change(limits) && (!request || wish(*request, request_name(*request)))
+                 ? "ok"
+                 : "error cannot be while it is " + state_name(state());
+    } catch (const Error &error) {
+      return std::string("error ") + error.what();
+    }
+  }
+
+  bool change(const std::map<std::string, double> &limits) {
+    const GripSettings settings = settings_for(gripper_traits(options_.gripper.model), limits);
+    if (!loop_.change(settings)) {
+      return false;
+    }
+    limits_ = limits;
+    grip_.set_cap_N(static_cast<float>(settings.cap_N));
+    return true;
+  }
+
+  std::string report_line() const {
+    const std::string columns = grip_columns(), cells = last_ ? grip_cells(row_of(*last_)) : "";
+    const auto names = split(columns, ','), values = split(cells, ',');
+    std::string line = "report";
+    for (std::size_t i = 0; i < values.size() && i < names.size(); i++) {
+      std::string value(values[i]);
+      std::replace(value.begin(), value.end(), ' ', ',');
+      line += " " + std::string(names[i]) + "=" + value;
+    }
+    return line;
   }
 
   void check(Gripper &gripper, const std::string &port) const {
@@ -290,20 +344,15 @@ private:
                    (news.status && (!last_->status || news.status->host_us != last_->status->host_us));
     if (last_ && report.state != last_->report.state) {
       state_since_us_ = news.host_us;
+      if (requests_) {
+        requests_->send("state " + state_name(report.state));
+      }
     }
     if (!changed && news.host_us - last_->host_us < ROW_us) {
       return;
     }
     last_ = news;
-    GripRow row;
-    row.time_us = static_cast<double>(news.host_us - zero_us_);
-    row.report = report;
-    row.command = news.command;
-    row.status = news.status;
-    if (row.status) {
-      row.status->host_us -= zero_us_;
-      row.status->fault = report.gripper_fault;
-    }
+    const GripRow row = row_of(news);
     grip_.take(row);
     keep([&] {
       recording_->writer().comment(GRIP_ROW_KEY, static_cast<double>(news.host_us),
@@ -311,15 +360,25 @@ private:
     });
   }
 
+  GripRow row_of(const GraspNews &news) const {
+    GripRow row{static_cast<double>(news.host_us - zero_us_), news.report, news.command, news.status};
+    if (row.status) {
+      row.status->host_us -= zero_us_;
+      row.status->fault = news.report.gripper_fault;
+    }
+    return row;
+  }
+
   std::uint8_t state() const { return last_ ? last_->report.state : std::uint8_t{GRIP_IDLE}; }
   std::int64_t state_us() const { return steady_now_us() - state_since_us_; }
 
-  void wish(GripRequest request, const std::string &name) {
+  bool wish(GripRequest request, const std::string &name) {
     bool done = loop_.request(request);
     event(name + (done ? "" : ", which cannot be now"));
     if (!done) {
       message_.show("cannot " + name + " while it is " + state_name(state()));
     }
+    return done;
   }
 
   /* At once, and in words of its own. */
@@ -444,12 +503,14 @@ private:
   }
 
   const GraspOptions &options_;
-  GripSettings settings_;
+  std::map<std::string, double> limits_;
+  GripSettings settings_; /* at the beginning */
   std::vector<Model> models_;
   GripModel grip_;
   std::optional<LiveRecording> recording_;
   std::unique_ptr<View> view_;
   GraspLoop loop_;
+  std::optional<LineServer> requests_;
   std::optional<GraspNews> last_; /* of kind step, that was kept */
   std::int64_t zero_us_ = 0, state_since_us_ = 0, inactive_since_us_ = 0;
   std::array<bool, FINGERS> has_zero_{}, touches_{};
@@ -469,7 +530,7 @@ int run(const GraspOptions &options) {
   if (!options.recording.empty()) {
     check_recording(options.recording, options.overwrite);
   }
-  return GraspSession(options, settings).run();
+  return GraspSession(options, limits, settings).run();
 }
 
 std::string plain(double value) {
