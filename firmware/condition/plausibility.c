@@ -1,11 +1,9 @@
 #include "condition/plausibility.h"
 
 #include "common/apart.h"
+#include "common/limits.h"
 
 #define INTERVAL_us 2000000u /* between two comparisons */
-/* Of any air in which a hand works: sea level in a storm is 108 kPa, 9 km up 30 kPa. */
-#define AIR_LEAST_Pa 30000
-#define AIR_MOST_Pa 120000
 
 bool plausibility_compare(struct plausibility *plausibility, const struct frame *frame,
                           const struct conditioned *conditioned) {
@@ -17,7 +15,7 @@ bool plausibility_compare(struct plausibility *plausibility, const struct frame 
   uint32_t no_air = 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
     pressure_Pa[k] = frame->pressure_Pa_q10[k] / 1024;
-    no_air |= pressure_Pa[k] < AIR_LEAST_Pa || pressure_Pa[k] > AIR_MOST_Pa ? usable & (UINT32_C(1) << k) : 0;
+    no_air |= pressure_Pa[k] < FT_AIR_MIN_Pa || pressure_Pa[k] > FT_AIR_MAX_Pa ? usable & (UINT32_C(1) << k) : 0;
   }
   plausibility->apart = no_air | apart_find(pressure_Pa, usable, frame->sensor_count, plausibility->apart_Pa);
   plausibility->compared = usable;

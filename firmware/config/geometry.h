@@ -1,7 +1,7 @@
 /* Where the sensors are: of the pad that is built for (FINGERTIP_PAD, boards/pads/README.md).
  *
- * Coordinates in mm in the plane of the pad, origin in its centre, x across the strips, y along them. On the boards' own pad
- * sensor k = 5 * strip + position along the strip. */
+ * Coordinates in mm in the plane of the pad, origin in its centre, x across the strips, y along them. On the boards'
+ * own pad sensor k = 5 * strip + position along the strip. */
 #pragma once
 
 #include "common/limits.h"

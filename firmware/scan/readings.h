@@ -56,10 +56,7 @@
 /* Within it no press rises by as much, but a hard tap. */
 #define READINGS_FAST_us 6000u
 #define READINGS_ALONE 256
-/* Moulding presses on the sensors: at rest those of four real strips differed by 2 to 12 kPa. A
- * sensitivity that is off by 1 % moves the reading at 1 bar by 2.9 kPa: what is apart by less
- * than this is no worse than the gains of a pad may be. */
-#define READINGS_APART_Pa_q10 (20000 * 1024)
+#define READINGS_APART_Pa_q10 (FT_APART_MAX_Pa * 1024)
 
 struct readings {
   bool presses_are_shared; /* see scan_settings */

@@ -43,10 +43,6 @@ constexpr std::pair<unsigned, double> TEMPERATURE_NOISE_degC[] = {MS58XX_OSR_TAB
 #undef ROW
 /* A slope needs at least four temperatures. */
 constexpr double DRIFT_SECONDS_MIN = 8;
-/* Readings of sound sensors under cast rubber differ by less: readings.h. */
-constexpr double APART_MAX_Pa = 20000;
-/* Air pressure, from the highest mountain to the deepest mine. */
-constexpr double AIR_MIN_Pa = 30000, AIR_MAX_Pa = 115000;
 /* The formulas of the family differ by powers of two and by what a count is (sensors.h). The formula
  * of one sensor turns another's codes into this multiple of the pressure, or this fraction. */
 constexpr double OF_ANOTHER_TYPE = 20;
@@ -296,7 +292,7 @@ private:
           check_of(k) + "; if it stays, replace it", {k});
     }
     double apart_Pa = sensor.mean_Pa - middle_Pa();
-    if (sensor.readings > 0 && std::abs(apart_Pa) > APART_MAX_Pa) {
+    if (sensor.readings > 0 && std::abs(apart_Pa) > FT_APART_MAX_Pa) {
       add(Verdict::warn, "sensors", named(k) + " reads " + fixed(apart_Pa / 1000, 0) + " kPa apart from the others",
           "release the pad; if it stays, rubber presses on it or it is damaged", {k});
     }
@@ -304,7 +300,7 @@ private:
 
   bool are_of_another_type() const {
     const double middle = middle_Pa();
-    auto is_air = [](double pressure_Pa) { return pressure_Pa >= AIR_MIN_Pa && pressure_Pa <= AIR_MAX_Pa; };
+    auto is_air = [](double pressure_Pa) { return pressure_Pa >= FT_AIR_MIN_Pa && pressure_Pa <= FT_AIR_MAX_Pa; };
     return is_air(middle * OF_ANOTHER_TYPE) || is_air(middle / OF_ANOTHER_TYPE);
   }
 
