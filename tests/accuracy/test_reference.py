@@ -18,7 +18,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/fit", "report/measure", "python")]
 import errors  # noqa: E402
 import presses  # noqa: E402
-from measure import Measure  # noqa: E402
+from measure import Measure, q10  # noqa: E402
 
 BUILD = sys.argv.pop()
 MEASURE = Measure(BUILD)
@@ -60,6 +60,26 @@ def cost_at(these, best, dx_mm=0.0, dy_mm=0.0):
     square = (X_mm - best["x_mm"][:, None] - dx_mm) ** 2 + (Y_mm - best["y_mm"][:, None] - dy_mm) ** 2
     left_Pa = best["p0_Pa"][:, None] * np.exp(-0.5 * square / best["sigma_mm"][:, None] ** 2) - these.readings / 1024
     return 0.5 * (np.square(left_Pa) * (these.usable[:, None] >> np.arange(15) & 1)).sum(axis=1)
+
+
+class Rectangles(unittest.TestCase):
+    def test_every_rectangle_reaches_the_optimum_with_seven_iterations(self):
+        other, random = presses.Compared(MEASURE), np.random.default_rng(SEED)
+        for columns, rows in ((2, 4), (3, 3), (3, 5), (4, 4), (4, 5), (5, 6), (6, 5)):
+            column, row = np.divmod(np.arange(columns * rows), rows)
+            other.x_mm, other.y_mm = 9.0 * (column - (columns - 1) / 2), 9.0 * (row - (rows - 1) / 2)
+            x_mm, y_mm = (random.uniform(places.min(), places.max(), (1000, 1)) for places in (other.x_mm, other.y_mm))
+            sigma_mm, p0_Pa = random.uniform(3.5, 8.0, (1000, 1)), 10.0 ** random.uniform(3.7, 4.7, (1000, 1))
+            square = (x_mm - other.x_mm) ** 2 + (y_mm - other.y_mm) ** 2
+            readings = q10(p0_Pa * np.exp(-square / (2 * sigma_mm**2)) + 5.0 * random.normal(size=square.shape))
+            best = other.optimum(readings, np.full(1000, (1 << columns * rows) - 1, np.uint32), np.full(1000, 5.0))
+            found = MEASURE.fit(
+                MEASURE.array(other.x_mm, other.y_mm, 9.0), MEASURE.settings(noise_Pa=5.0, iterations=7, cut_noises=0), readings
+            )
+            judged = best["observable"] & ~best["at_bound"]
+            self.assertGreater(judged.mean(), 0.9)
+            off_um = 1000 * np.hypot(found["x_mm"] - best["x_mm"], found["y_mm"] - best["y_mm"])[judged]
+            self.assertLess(np.quantile(off_um, 0.999), 1.0, (columns, rows))
 
 
 class Optimum(unittest.TestCase):

@@ -154,12 +154,8 @@ def inputs(
     own = None
     if known.get("off_x_mm"):
         own = chip.made("fit_own", 1, len(pad.x_mm))
-        for name, key, unit in (
-            ("off_x_q15", "off_x_mm", pad.pitch_mm),
-            ("off_y_q15", "off_y_mm", pad.pitch_mm),
-            ("wider_q15", "wider", 1.0),
-        ):
-            own[name] = round_half_away(np.clip(32768.0 * of_sensors(key, 0.0) / unit, -32767, 32767))
+        for key, unit in (("off_x_mm", pad.pitch_mm), ("off_y_mm", pad.pitch_mm), ("wider", 1.0)):
+            own[f"{key.removesuffix('_mm')}_q15"] = round_half_away(np.clip(32768.0 * of_sensors(key, 0.0) / unit, -32767, 32767))
     readings = np.clip(reading_Pa / of_sensors("gain", 1.0), -MOST_Pa, MOST_Pa)
     return chip.array(*pad[1:4]), settings, q10(readings), usable_of(reading_Pa), own
 
@@ -248,26 +244,31 @@ def _add_shapes(chip: Any, of: tuple[Any, ...], profile: Any, scale: float, foun
     shapes, places = chip.made("fit_shapes_result", rows, 2), chip.made("shapes_place", rows, 2)
     estimated = chip.tangential(array, profile, settings, held, np.ascontiguousarray(usable), own=own)
     chip.call("publish", profile, np.full(rows, scale), *(np.ascontiguousarray(each[:, -1]) for each in estimated), published)
-    valid = published["valid"]
-    for name in ("x_mm", "y_mm", "location_sd_mm", "force_N"):
-        found[name][valid] = published[name][valid]
-    for name, share in (("qx_N", "qx"), ("qy_N", "qy"), ("q_sd_N", "q_sd")):
-        found[name] = np.where(valid, published[share] * published["force_N"], np.nan)
-    found["flags"] |= np.where(valid, int(Flag.TANGENTIAL_VALID), 0)
-    try:
+    with contextlib.suppress(MeasureError):  # rubber too thin for the pitch has no shapes
         chip.call("shapes_pad", array, profile, pad)
-    except MeasureError:  # rubber too thin for the pitch
-        return
-    chip.call("held_shapes", array, pad, settings, chip.no_own if own is None else own, held, published, shapes, places)
-    last = shapes[:, 1]
-    found["shape"] = last["shape"].astype(np.int64)
-    known, two, edge = found["shape"] > 0, found["shape"] == SHAPES.index("two"), found["shape"] == SHAPES.index("elongated")
-    found["location_sd_mm"] = np.where(known, places["location_sd_mm"][:, 1], found["location_sd_mm"])
+        chip.call("held_shapes", array, pad, settings, chip.no_own if own is None else own, held, published, shapes, places)
+    last, shape = shapes[:, 1], shapes["shape"][:, 1].astype(np.int64)
+    two, edge = (shape == SHAPES.index(name) for name in ("two", "elongated"))
+    valid = published["valid"] & ~two
+    for name in ("x_mm", "y_mm", "location_sd_mm", "force_N"):
+        found[name] = np.where(valid, published[name], found[name])
+    for name in ("qx", "qy", "q_sd"):
+        found[f"{name}_N"] = np.where(valid, published[name] * published["force_N"], np.nan)
+    found["location_sd_mm"] = np.where((shape > 0) & ~two, places["location_sd_mm"][:, 1], found["location_sd_mm"])
+    found["shape"] = shape
     for k, (name, factor) in itertools.product(range(2), (("x_mm", 1.0), ("y_mm", 1.0), ("force_N", scale or 1.0))):
         found[name.replace("_", f"{k + 1}_")] = np.where(two, factor * last[name][:, k].astype(float), np.nan)
     found["edge_angle_deg"] = np.where(edge, np.degrees(np.arctan2(last["along_y"], last["along_x"])), np.nan)
     found["edge_length_mm"] = np.where(edge, last["length_mm"].astype(float), np.nan)
-    for these, flag in ((known, Flag.SHAPE_VALID), (two, Flag.TWO_CONTACTS), (edge, Flag.EDGE)):
+    uncertain = found["location_sd_mm"] > chip.constants["location_sd_limit_mm"]
+    of_shape = (
+        (shape > 0, Flag.SHAPE_VALID),
+        (two, Flag.TWO_CONTACTS),
+        (edge, Flag.EDGE),
+        (shape == SHAPES.index("none"), Flag.SHAPE_UNKNOWN),
+    )
+    found["flags"] &= ~int(Flag.UNCERTAIN)
+    for these, flag in ((valid, Flag.TANGENTIAL_VALID), (uncertain, Flag.UNCERTAIN), *of_shape):
         found["flags"] |= np.where(these, int(flag), 0)
 
 

@@ -57,6 +57,7 @@ class Fit(unittest.TestCase):
                 if "qx_N" in thick:
                     self.assertGreater(np.isfinite(thick["qx_N"]).mean(), 0.9)
                     self.assertEqual((thick["shape"] > 0).mean() > 0.9, len(pad.x_mm) >= 12)
+                    np.testing.assert_array_equal(thick["flags"] & Flag.UNCERTAIN > 0, thick["location_sd_mm"] > 0.6)
 
     def test_two_contacts_and_a_pull_are_found(self):
         pad = read_pad("4x4")
@@ -65,6 +66,12 @@ class Fit(unittest.TestCase):
         two = fingertip.fit(9000.0 * one + 6000.0 * other, described)
         self.assertEqual(SHAPES[two["shape"][0]], "two")
         self.assertLess(abs(two["x1_mm"][0] + 9.0) + abs(two["x2_mm"][0] - 9.0), 1.0)
+        one, other = (responses(pad, [x], [0.0], SIGMA_mm) for x in (-4.0, 4.0))  # which looks like a pull too
+        near = fingertip.fit(9000.0 * one + 1080.0 * other, described, calibration={"gain_sd": [0.002] * 16})
+        self.assertTrue(near["flags"][0] & Flag.TWO_CONTACTS and np.isnan(near["qx_N"][0]))
+        ring = responses(pad, [0.0], [0.0], 3 * SIGMA_mm) - responses(pad, [0.0], [0.0], 0.8 * SIGMA_mm)
+        unknown = fingertip.fit(9000.0 * ring, described)
+        self.assertTrue(SHAPES[unknown["shape"][0]] == "none" and unknown["flags"][0] & Flag.SHAPE_UNKNOWN)
         broad = (pad.x_mm - 1.0) / 9.0 * responses(pad, [1.0], [0.0], 1.5 * SIGMA_mm)
         pulled = fingertip.fit(9000.0 * across + 1000.0 * broad, described, calibration={"gain_sd": [0.002] * 16})
         self.assertGreater(pulled["qx_N"][0], 3 * pulled["q_sd_N"][0] + 10 * abs(pulled["qy_N"][0]))
