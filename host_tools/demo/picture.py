@@ -3,10 +3,12 @@
 
     picture.py RECORDING.csv -o FILE.png [--device SERIAL] [--at S] [--until S [--every S]] [--size COLUMNSxROWS] [--tool PATH]
 
-The picture in the README of the project is that of the first touch of the calibrated fingertip in the demo. The replay shows its S in the last line:
+The picture in the README of the project is that of the first touch of the calibrated fingertip in the demo. Alone it is played by its own time,
+however slow the emulator was:
 
     sh cmake/bootstrap.sh demo
-    /usr/bin/python3 host_tools/demo/picture.py build/demo/recording.csv --device 000000000000B0BB --at S --until S -o host_tools/demo/monitor.png
+    build/host/host_tools/tool/cli/fingertip convert build/demo/recording.csv build/demo/rubber.csv --device 000000000000B0BB
+    /usr/bin/python3 host_tools/demo/picture.py build/demo/rubber.csv --at 0.9 --until 4.3 -o host_tools/demo/monitor.png
 
 That of a lift in host_tools/README.md is of the firmware on the host:
 
