@@ -3,10 +3,9 @@
 
 usage: bin2uf2.py INPUT.bin OUTPUT.uf2
 
-Format: https://github.com/microsoft/uf2. Family RP2040; 256 bytes a block, the flash page. The last
-page is padded with zeros. The image has no holes, which the loader gets wrong (erratum RP2040-E14).
-After its page each block holds "CRC " and the CRC-32 of all pages, which the loader does not look at and
-`fingertip flash` does.
+Format: https://github.com/microsoft/uf2. Family RP2040; 256 bytes a block, the flash page. The last page is padded with zeros. The image
+has no holes, which the loader gets wrong (erratum RP2040-E14). After its page each block holds "CRC " and the CRC-32 of all pages, which
+the loader does not look at and `fingertip flash` does.
 """
 
 import struct

@@ -73,8 +73,7 @@ double sim_ms5840_pressure_Pa(const uint16_t *prom, uint32_t d1, uint32_t d2);
 uint32_t sim_ms5840_d2(const uint16_t *prom, double temperature_degC);
 uint32_t sim_ms5840_d1(const uint16_t *prom, double pressure_Pa, uint32_t d2);
 
-/* Datasheet rows: longest conversion, and noise of one reading. osr: 256, 512, 1024, 2048, 4096 or
- * 8192. */
+/* Datasheet rows: longest conversion, and noise of one reading. osr: 256, 512, 1024, 2048, 4096 or 8192. */
 uint32_t sim_ms5840_conversion_us(unsigned osr);
 double sim_ms5840_noise_Pa(unsigned osr);
 double sim_ms5840_noise_degC(unsigned osr);

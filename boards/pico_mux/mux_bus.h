@@ -44,12 +44,7 @@ struct mux_bus {
   uint64_t shut_until_us;
   uint32_t shut_us; /* how long the next one is */
 
-  enum mux_bus_transaction {
-    MUX_BUS_NOTHING,
-    MUX_BUS_SELECT,
-    MUX_BUS_WRITE,
-    MUX_BUS_FETCH,
-  } under_way;
+  enum mux_bus_transaction { MUX_BUS_NOTHING, MUX_BUS_SELECT, MUX_BUS_WRITE, MUX_BUS_FETCH } under_way;
   uint8_t select_mux;
   uint8_t select_channels;
   bool controller_busy; /* the transaction under way could not be loaded yet */

@@ -40,10 +40,9 @@ enum ft_status i2c_start_write(uint8_t address, uint8_t byte);
 /* START, address, byte_count (1..I2C_MAX_READ_BYTES) bytes read, STOP. */
 enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count);
 
-/* FT_PENDING: under way, the owner will be called. FT_ERR_BUSY: the controller is still leaving the
- * transaction before; no call will come, ask again after I2C_IDLE_us. FT_OK: ended, the bytes read
- * are in bytes. FT_ERR_NACK: ended, the address or the byte was not acknowledged. FT_ERR_TIMEOUT:
- * ended without its STOP, as when arbitration is lost. */
+/* FT_PENDING: under way, the owner will be called. FT_ERR_BUSY: the controller is still leaving the transaction before;
+ * no call will come, ask again after I2C_IDLE_us. FT_OK: ended, the bytes read are in bytes. FT_ERR_NACK: ended, the
+ * address or the byte was not acknowledged. FT_ERR_TIMEOUT: ended without its STOP, as when arbitration is lost. */
 enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]);
 #define I2C_IDLE_us 5u
 

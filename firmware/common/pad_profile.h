@@ -2,9 +2,8 @@
  * thickness and overhang (`fingertip pad`). The packets carry it, the fingertip keeps it, and the
  * estimate of tangential force uses it (fit_tangential.h).
  *
- * Lengths are those of one bonded layer, so all of them grow with its thickness. Let t2 be the
- * contact's own spread (variance of its pressure along one axis, mm^2). A contact that presses by F
- * gives on the base
+ * Lengths are those of one bonded layer, so all of them grow with its thickness. Let t2 be the contact's own spread
+ * (variance of its pressure along one axis, mm^2). A contact that presses by F gives on the base
  *   F sum_j share_j / (2 pi v_j) exp(-r^2 / 2 v_j),                   v_j = sd_j^2 + t2
  * A contact that pulls by Q along x adds
  *   Q sum_j moment_j x / (2 pi v_j^2) exp(-r^2 / 2 v_j),              v_j = sd_j^2 + 1.3 t2 */

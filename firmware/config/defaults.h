@@ -27,12 +27,10 @@
 #define DEFAULT_USES_SHAPE 1 /* that a calibration found */
 #endif
 
-/* Force over 2 pi p0 sigma^2 of a pad that was never calibrated. A contact's tails are not
- * Gaussian, and the missing force depends on the layer: the product holds 0.90 to 0.97 of it on 6
- * to 12 mm of rubber (the twin's validation). On four real pads under what was hung on them it read 0.28, 1.0, 2.5 and
- * 2.6 times of it: rubber and its skin pass on more or less of a press. So newtons without a weight are an order of
- * size.
- */
+/* Force over 2 pi p0 sigma^2 of a pad that was never calibrated. A contact's tails are not Gaussian, and the missing
+ * force depends on the layer: the product holds 0.90 to 0.97 of it on 6 to 12 mm of rubber (the twin's validation). On
+ * four real pads under what was hung on them it read 0.28, 1.0, 2.5 and 2.6 times of it: rubber and its skin pass on
+ * more or less of a press. So newtons without a weight are an order of size. */
 #define DEFAULT_FORCE_SCALE 1.0f
 #define DEFAULT_FORCE_SCALE_SD 0.8f
 

@@ -1,29 +1,25 @@
 /* How the contact moves, and whether it slides. Both come from the location that is corrected for
  * the tangential force, and from that force.
  *
- * Motion alone does not show a slide. Rubber that takes over a tangential force gives way, and the contact
- * creeps along: by 1 to 5 mm for each unit of Q / F, tangential over normal force, as Mindlin's
- * contact does ("Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949). It always
- * creeps with the tangential force, never against it. If all of the contact slides, it goes on while Q / F
- * stays or comes down, as friction falls once it has given way. So the measure is how far the
- * contact has moved beyond what the change of its tangential force explains:
+ * Motion alone does not show a slide. Rubber that takes over a tangential force gives way, and the contact creeps
+ * along: by 1 to 5 mm for each unit of Q / F, tangential over normal force, as Mindlin's contact does ("Compliance of
+ * elastic bodies in contact", J. Appl. Mech. 16, 1949). It always creeps with the tangential force, never against it.
+ * If all of the contact slides, it goes on while Q / F stays or comes down, as friction falls once it has given way. So
+ * the measure is how far the contact has moved beyond what the change of its tangential force explains:
  *   |d| - MOTION_PER_RATIO_mm dq . d / |d|,    d: displacement, dq: change of Q / F, both vectors
  * from an earlier span of time to the latest. Location and tangential force are means over the same frames, so
  * that no course of a tangential force makes an elastic contact slide.
  *
- * There are three pairs of spans. The brief one shows a slide of 7 mm/s or more. The brisk one
- * shows one of 15 mm/s or more sooner, and within a lift: it does not reach back to where the tangential force
- * still rose. The slow one is for a creep of 1 mm/s or more. It counts only as long as the contact
- * still moves.
+ * There are three pairs of spans. The brief one shows a slide of 7 mm/s or more. The brisk one shows one of 15 mm/s or
+ * more sooner, and within a lift: it does not reach back to where the tangential force still rose. The slow one is for
+ * a creep of 1 mm/s or more. It counts only as long as the contact still moves.
  *
- * Limits: a contact that rolls moves without a tangential force as a sliding one does. So does one carried
- * along by an object that is held elsewhere too. Friction that rises with a slide by more than 1 /
- * MOTION_PER_RATIO_mm for each mm hides it. A location that jumps because another set of sensors is
- * in use is no motion: then the history is dropped.
+ * Limits: a contact that rolls moves without a tangential force as a sliding one does. So does one carried along by an
+ * object that is held elsewhere too. Friction that rises with a slide by more than 1 / MOTION_PER_RATIO_mm for each mm
+ * hides it. A location that jumps because another set of sensors is in use is no motion: then the history is dropped.
  *
- * Sums are integers modulo 2^32. Their difference over a span is exact however long they have run.
- * The cost does not grow with the number of frames in a span. Main context only: it divides with
- * port/divide.h. */
+ * Sums are integers modulo 2^32. Their difference over a span is exact however long they have run. The cost does not
+ * grow with the number of frames in a span. Main context only: it divides with port/divide.h. */
 #pragma once
 
 #include "contact/contact.h"

@@ -1,12 +1,10 @@
-/* Slip distance: how far the contact has moved away from its recent mean (De Clercq et al., RA-L
- * 2022, eq. (7)):
+/* Slip distance: how far the contact has moved away from its recent mean (De Clercq et al., RA-L 2022, eq. (7)):
  *   eps_i = | r_i - (r_{i-1} + ... + r_{i-n}) / n |
  * It is a slip if eps_i exceeds a threshold.
  *
- * The paper counts n steps. Here the history is a span of time, so that the metric means the same
- * at any frame rate. n is the number of frames within the window, with half a frame interval
- * granted for jitter. At 20 Hz a window of 100 ms gives n = 2, the paper's setting. At constant
- * speed v the distance is v (window + one interval) / 2.
+ * The paper counts n steps. Here the history is a span of time, so that the metric means the same at any frame rate. n
+ * is the number of frames within the window, with half a frame interval granted for jitter. At 20 Hz a window of 100 ms
+ * gives n = 2, the paper's setting. At constant speed v the distance is v (window + one interval) / 2.
  *
  * Positions are integers of 1/16 um, so the running sums are exact however long they run. The cost
  * does not grow with n. */

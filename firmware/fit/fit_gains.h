@@ -1,6 +1,5 @@
-/* How far the gains of a pad's sensors are apart, learnt from touches: of a pad that was never
- * calibrated it is not known, and what four fitted parameters leave of their errors is in the residual
- * of each touch. So
+/* How far the gains of a pad's sensors are apart, learnt from touches: of a pad that was never calibrated it is not
+ * known, and what four fitted parameters leave of their errors is in the residual of each touch. So
  *   gain_sd^2 = sum(R / M) / sum(0.58 (sigma / pitch)^3),
  * R and M the squares of the touch's residual, less those of the model's error, and of the fitted
  * Gaussian. The denominator is the share of independent relative errors that the fit leaves, within
@@ -28,10 +27,9 @@ void fit_gains_begin(struct fit_gains *gains, float gain_sd);
 /* At each frame without a contact. */
 void fit_gains_lift(struct fit_gains *gains);
 
-/* A fit and its readings, some milliseconds after the one before. Whether the sums have changed:
- * once a touch, when p0 is within 2 % of that before. A fit does not count that is at a limit,
- * FLAT, without a sensor of the array, narrow, wide, or whose noise would decide. Costs some 6000
- * cycles on a Cortex-M0+. */
+/* A fit and its readings, some milliseconds after the one before. Whether the sums have changed: once a touch, when p0
+ * is within 2 % of that before. A fit does not count that is at a limit, FLAT, without a sensor of the array, narrow,
+ * wide, or whose noise would decide. Costs some 6000 cycles on a Cortex-M0+. */
 bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array, const int32_t *pressure_Pa_q10,
                      const struct fit_settings *settings, const struct fit_result *result);
 

@@ -1,12 +1,11 @@
 /* Gauss-Newton without a matrix to solve. On a full rectangle the model is a product e = gx gy, and
  * its derivatives span
  *   e, e p1(x), e q1(y), e (p2(x) + q2(y))
- * with p and q the polynomials of degree 1 and 2 that are orthogonal over the nodes under gx^2 and
- * gy^2. So the normal matrix is diagonal, and a direction that the data hardly determine is a small
- * element with its full relative precision: 16-bit factors do. The amplitude is the best one for the
- * shape (variable projection). Rounding in matrix, step or amplitude only turns or stretches a step;
- * where the fit ends is decided by the right-hand side. So the residual is computed to 2^-26 of the
- * largest reading and then rounded relative to its own size. */
+ * with p and q the polynomials of degree 1 and 2 that are orthogonal over the nodes under gx^2 and gy^2. So the normal
+ * matrix is diagonal, and a direction that the data hardly determine is a small element with its full relative
+ * precision: 16-bit factors do. The amplitude is the best one for the shape (variable projection). Rounding in matrix,
+ * step or amplitude only turns or stretches a step; where the fit ends is decided by the right-hand side. So the
+ * residual is computed to 2^-26 of the largest reading and then rounded relative to its own size. */
 #include "common/contact_flags.h"
 #include "fit/fit_grid_solve.h"
 #include "fit/fit_limits.h"
@@ -266,8 +265,7 @@ static NOINLINE void finish(const struct readings *readings, const struct moment
 /* How far the contact is from round. Widths that differ, e p2(x) and e q2(y) with signs of their
  * own, and a slant, e p1(x) q1(y), are two more orthogonal columns. Their coefficients are
  *   stretch = log(sigma_x / sigma_y)  and  slant,
- * the same for a contact turned by 45 degrees; together they are the logarithm of the longer width
- * over the shorter. */
+ * the same for a contact turned by 45 degrees; together they are the logarithm of the longer width over the shorter. */
 struct shape {
   struct scaled wider_x, wider_y, stretch, slant; /* wider: log of sigma_x / sigma, sigma_y / sigma */
   struct scaled noise_form;   /* by which the readings' variance gives that of (length of both)^2 / 2 */

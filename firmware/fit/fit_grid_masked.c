@@ -637,8 +637,7 @@ static NOINLINE void evaluate(const struct readings *readings, enum accuracy acc
   fit_grid_complete(readings, system);
 }
 
-/* Readings in use, which sensors are not (in their residual's place), and how many are. False:
- * nothing to fit. */
+/* Readings in use, which sensors are not (in their residual's place), and how many are. False: nothing to fit. */
 static bool gather(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
                    const struct fit_settings *settings, struct readings *readings, int *count) {
   *count = 0;

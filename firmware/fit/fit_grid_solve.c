@@ -45,8 +45,7 @@ FIXED_INLINE int32_t step_along(const struct scaled *b, const struct scaled *d, 
 }
 
 /* With c = b / d / stiffness:
- *   dsigma / sigma = c3,  dx = c1 - cross c2 + (2 x - slope_x) c3,  dy = c2 + (2 y - slope_y) c3.
- */
+ *   dsigma / sigma = c3,  dx = c1 - cross c2 + (2 x - slope_x) c3,  dy = c2 + (2 y - slope_y) c3. */
 void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system, struct state *state) {
   int32_t c1 = step_along(&system->b1, &system->d1, &system->stiffness, 26);
   int32_t c2 = step_along(&system->b2, &system->d2, &system->stiffness, 26);

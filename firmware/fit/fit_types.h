@@ -57,9 +57,8 @@ struct fit_settings {
   uint8_t iterations;   /* 0 (the guess)..FIT_MAX_ITERATIONS; 4 come as near to the truth as more
                            do, 7 bring 99.9 % of observable presses within 1 um of the optimum */
   int32_t noise_Pa_q10; /* rms noise of a reading, 1/1024 Pa; below 1 there is no fit */
-  /* Weak prior on sigma, for rubber so stiff that the array can hardly determine it: one more row
-   * FIT_PRIOR_WEIGHT largest (sigma - prior_sigma) / prior_width. None unless the width is
-   * 0.001..10000 mm and sigma 0..10000 mm. */
+  /* Weak prior on sigma, for rubber so stiff that the array can hardly determine it: one more row FIT_PRIOR_WEIGHT
+   * largest (sigma - prior_sigma) / prior_width. None unless the width is 0.001..10000 mm and sigma 0..10000 mm. */
   float prior_sigma_mm, prior_width_mm;
   /* A reading cut_noises noise_Pa below zero counts as zero, since a Gaussian is never negative. 0: no
    * reading is changed, as a tangential force asks for. */

@@ -1,9 +1,8 @@
 /* The sensors of the MS58xx family: one section each. The build chooses one (FINGERTIP_SENSOR in
  * cmake/options.cmake), so that an image holds nothing of the others.
  *
- * All of them have the same commands and the same PROM (W0: CRC-4 in its top four bits, then the
- * product type; W1..W6: C1..C6). All have the same temperature, 2000 + dT * C6 / 2^23. They differ
- * in:
+ * All of them have the same commands and the same PROM (W0: CRC-4 in its top four bits, then the product type; W1..W6:
+ * C1..C6). All have the same temperature, 2000 + dT * C6 / 2^23. They differ in:
  *
  *   MAX_PRESSURE_Pa   readings above are flagged: beyond the range, or near it
  *   APART_Pa          more than two sound parts differ by in the same air (condition/plausibility.h)
@@ -19,9 +18,9 @@
  *   OSR_TABLE         ratio, its bits in the convert commands, longest conversion in us, noise of a
  *                     pressure in Pa rms and of a temperature in degC rms
  *
- * To add a sensor, add a section here, its name in cmake/options.cmake, and its data in
- * boards/native/sim_ms5840.c and in the emulator's board/ms5840.mjs. If its CRC is elsewhere
- * (MS5611: in an eighth word), change ms58xx_prom_crc4 too. */
+ * To add a sensor, add a section here, its name in cmake/options.cmake, and its data in boards/native/sim_ms5840.c and
+ * in the emulator's board/ms5840.mjs. If its CRC is elsewhere (MS5611: in an eighth word), change ms58xx_prom_crc4 too.
+ */
 #pragma once
 
 #define MS58XX_MS5840 1

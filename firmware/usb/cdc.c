@@ -8,12 +8,7 @@
 
 /* Class requests, PSTN 1.2 section 6.3, all to the control interface */
 enum { TO_CONTROL_INTERFACE = 0x21, FROM_CONTROL_INTERFACE = 0xa1 };
-enum class_request {
-  SET_LINE_CODING = 0x20,
-  GET_LINE_CODING = 0x21,
-  SET_CONTROL_LINE_STATE = 0x22,
-  SEND_BREAK = 0x23,
-};
+enum class_request { SET_LINE_CODING = 0x20, GET_LINE_CODING = 0x21, SET_CONTROL_LINE_STATE = 0x22, SEND_BREAK = 0x23 };
 enum { LINE_CODING_BYTES = 7, CONTROL_LINE_DTR = 1, LOADER_BAUD = 1200 };
 
 enum { TRANSMIT_BYTES = 4096, RECEIVE_BYTES = 256 };

@@ -3,11 +3,7 @@
 #include "common/bytes.h"
 #include "port/usb_controller.h"
 
-enum descriptor_type {
-  DESCRIPTOR_DEVICE = 1,
-  DESCRIPTOR_CONFIGURATION = 2,
-  DESCRIPTOR_STRING = 3,
-};
+enum descriptor_type { DESCRIPTOR_DEVICE = 1, DESCRIPTOR_CONFIGURATION = 2, DESCRIPTOR_STRING = 3 };
 
 enum string_index { STRING_LANGUAGES, STRING_MANUFACTURER, STRING_PRODUCT, STRING_SERIAL };
 

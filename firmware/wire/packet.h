@@ -2,14 +2,12 @@
  *
  * PROTOCOL.md is the specification. Firmware and host use this same code. A frame on the line is
  *   COBS(header 12 bytes, body, CRC-32/ISO-HDLC of header and body) 0x00
- * and nothing on the line depends on the byte order, the alignment or the structure padding of the
- * machine. Floats are IEEE 754 binary32 and always finite: the encoder refuses others and the
- * decoder rejects them.
+ * and nothing on the line depends on the byte order, the alignment or the structure padding of the machine. Floats are
+ * IEEE 754 binary32 and always finite: the encoder refuses others and the decoder rejects them.
  *
  * line.toml describes the bodies; bodies.h has them as structs, with their units and ranges. Each has
  * one constant, its layout, for both directions. Code that encodes or decodes names its layouts, so an
- * image holds those of its own packets and commands only.
- */
+ * image holds those of its own packets and commands only. */
 #pragma once
 
 #include "common/status.h"

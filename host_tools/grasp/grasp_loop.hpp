@@ -10,10 +10,9 @@
 //   }
 //   loop.end();                                                 the width stays
 //
-// Threads: one for each fingertip (DeviceLoop), one for the gripper (GripperThread), and one that
-// steps the core at each frame and answer, and every 5 ms without any. None waits for the reader of
-// the news. News that are not read for long are dropped and counted. All times are of the host's
-// steady clock. The core has no other clock.
+// Threads: one for each fingertip (DeviceLoop), one for the gripper (GripperThread), and one that steps the core at
+// each frame and answer, and every 5 ms without any. None waits for the reader of the news. News that are not read for
+// long are dropped and counted. All times are of the host's steady clock. The core has no other clock.
 //
 // A failure is a trouble in the report and never opens the gripper. The loop waits for a fingertip
 // or a gripper that is gone, and goes on when it is back. If this process dies, the gripper goes to
@@ -65,9 +64,8 @@ public:
   struct Options {
     std::uint8_t streams = WIRE_STREAM_ALL;
     bool activate = false; // where the core asks for it; else it is never passed on
-    // How often the user wants the width to stay, for callers whose own thread may be held up by a
-    // terminal. The loop asks with every step. The first time the width stays, the second time the
-    // gripper opens.
+    // How often the user wants the width to stay, for callers whose own thread may be held up by a terminal. The loop
+    // asks with every step. The first time the width stays, the second time the gripper opens.
     std::function<unsigned()> interrupts = [] { return 0u; };
   };
 
@@ -83,8 +81,7 @@ public:
   // The earlier of both DeviceLoops' read_until_us.
   double read_until_us() const;
 
-  // Their news of kind ready, once both have answered. Throws Error, and Interrupted once stop reports
-  // so.
+  // Their news of kind ready, once both have answered. Throws Error, and Interrupted once stop reports so.
   std::array<DeviceNews, FINGERS> meet(const std::function<bool()> &stop);
 
   // Fingertips stream, the core steps; nothing moves before it is requested. Throws Error where the

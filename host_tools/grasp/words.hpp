@@ -27,8 +27,7 @@ std::optional<GripRequest> request_of_name(std::string_view name);
 std::string trouble_names(std::uint32_t trouble);
 // Nothing where a word is none of them.
 std::optional<std::uint32_t> trouble_of_names(std::string_view names);
-// One for each bit of a report's; finger 0 is called left, 1 right. With the numbers that they are
-// about.
+// One for each bit of a report's; finger 0 is called left, 1 right. With the numbers that they are about.
 std::vector<std::string> trouble_texts(const GripReport &report);
 
 } // namespace fingertip

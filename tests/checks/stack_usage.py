@@ -3,17 +3,14 @@
 
 usage: stack_usage.py IMAGE.elf --su-dir FOLDER... [--indirect FILE] [--of FUNCTION...] [--limit BYTES] [--json FILE]
 
-Frames come from the compiler (GCC's -fstack-usage files below the folders, which hold nothing but
-what the image may be linked from); of functions that it did not compile, from the disassembly, as
-the sum of all that they push. Calls are read from the linked code, because only there library
-functions and tail calls can be seen; a tail call counts as a call. Calls through pointers are
-resolved by a table (indirect_calls.txt tells its form). A call that the table does not resolve,
-recursion, and a frame of unknown size fail.
+Frames come from the compiler (GCC's -fstack-usage files below the folders, which hold nothing but what the image may be linked from); of
+functions that it did not compile, from the disassembly, as the sum of all that they push. Calls are read from the linked code, because only
+there library functions and tail calls can be seen; a tail call counts as a call. Calls through pointers are resolved by a table
+(indirect_calls.txt tells its form). A call that the table does not resolve, recursion, and a frame of unknown size fail.
 
-A handler is interrupted only by one of higher priority, as the table rp2040_irq_priorities has them, so at
-most one of each priority runs on top of the main program: worst case = start-up and main + for each
-priority an exception frame and its deepest handler. A fault can come on top, but it ends in a reset. With
---of: what each of these functions needs, from its call on, and no more.
+A handler is interrupted only by one of higher priority, as the table rp2040_irq_priorities has them, so at most one of each priority runs
+on top of the main program: worst case = start-up and main + for each priority an exception frame and its deepest handler. A fault can come
+on top, but it ends in a reset. With --of: what each of these functions needs, from its call on, and no more.
 
 The exception frame has 32 bytes, and 4 more when the stack must be aligned (ARMv6-M B1.5.7).
 """

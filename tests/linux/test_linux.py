@@ -2,10 +2,9 @@
 
 usage: test_linux.py --image F.bin --parallel F.bin --cpack CPACK --build FOLDER --node NODE --cache FOLDER --report usb.json
 
-The tests are one story and run in order: a first boot of the device streams over the serial port and ends with the
-boot loader request, a second one over libusb and ends with a 1200-baud touch, the third is of the other board, and
-another fingertip is plugged in beside it. What the tool receives must be what the device sent, byte by byte. Exit: 77 if
-this machine cannot run it.
+The tests are one story and run in order: a first boot of the device streams over the serial port and ends with the boot loader request, a
+second one over libusb and ends with a 1200-baud touch, the third is of the other board, and another fingertip is plugged in beside it. What
+the tool receives must be what the device sent, byte by byte. Exit: 77 if this machine cannot run it.
 
 real time: a kernel in a virtual machine. Its busybox has nothing that waits for a file to change, so the machine's shell looks
 for one every tenth of a second. Limits are for what hangs; the one time that is judged is judged beside the machine's own delays.
@@ -59,10 +58,9 @@ STREAM_LIMIT_s = 600
 # What the emulator says of its time each second.
 PROGRESS = re.compile(r"^([\d.]+) / \d+ s, [\d.]+ x real time$")
 KERNEL_WARNING = 4
-# What the driver says when QEMU's controller, having taken transfers back amid data, reports one that is not next on its
-# ring. The first and the last were seen, each once in some twenty runs; the last sums up the transfers in between, of 64
-# bytes each, which is all that a device could send in one. The order of a ring is between those two, so it is counted
-# apart.
+# What the driver says when QEMU's controller, having taken transfers back amid data, reports one that is not next on its ring. The first
+# and the last were seen, each once in some twenty runs; the last sums up the transfers in between, of 64 bytes each, which is all that a
+# device could send in one. The order of a ring is between those two, so it is counted apart.
 CONTROLLER_WARNING = re.compile(
     r"xhci_hcd [\w:.]+: (ERROR Transfer event TRB DMA ptr not part of current TD|Looking for event-dma |"
     r"WARN Event TRB for slot \d+ ep \d+ with no TDs queued|URB req \d+ and actual \d+ transfer length mismatch)"

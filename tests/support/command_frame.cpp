@@ -3,10 +3,9 @@
 //
 // usage: command_frame [--sequence N] COMMAND [ARGS]
 //
-// COMMAND: stream none|contact,raw,health; tare; tare-force; rate HZ|max; osr N; slip THRESHOLD_MM
-// WINDOW_MS; prior SIGMA[:WIDTH]|none; limit MM; keep; forget; calibrate SIGMA_MM DIP_PERCENT; erase
-// (the calibration); pad THICKNESS_MM OVERHANG_MM; pad-from-touch, with the same; erase-pad; sync
-// MODE|off; info; health; crash; loader
+// COMMAND: stream none|contact,raw,health; tare; tare-force; rate HZ|max; osr N; slip THRESHOLD_MM WINDOW_MS; prior
+// SIGMA[:WIDTH]|none; limit MM; keep; forget; calibrate SIGMA_MM DIP_PERCENT; erase (the calibration); pad THICKNESS_MM
+// OVERHANG_MM; pad-from-touch, with the same; erase-pad; sync MODE|off; info; health; crash; loader
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"

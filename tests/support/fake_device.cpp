@@ -1,5 +1,4 @@
-/* A fingertip without firmware, for tests of the host tools: serves a port with the
- * wire protocol's own codec.
+/* A fingertip without firmware, for tests of the host tools: serves a port with the wire protocol's own codec.
  *
  *   fake_device LINK [key=value]...
  *     rate=HZ          frames a second, default 200

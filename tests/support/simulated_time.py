@@ -166,8 +166,7 @@ class Output:
 
 
 class Process:
-    """A program in this world, as subprocess.Popen has it; what it writes is text, unless text=False. Waits are of the world's
-    time."""
+    """A program in this world, as subprocess.Popen has it; what it writes is text, unless text=False. Waits are of the world's time."""
 
     def __init__(
         self, world, arguments, env=None, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options

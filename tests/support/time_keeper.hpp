@@ -1,7 +1,6 @@
-// What a thread on simulated time and the keeper of that time tell one another: one of these a
-// message, over a connection of its own to the keeper's socket (AF_UNIX, SOCK_SEQPACKET). With a
-// wait come the descriptors that may end it, as SCM_RIGHTS. Each wait and each hello is answered,
-// once this thread is to go on, by a Turn.
+// What a thread on simulated time and the keeper of that time tell one another: one of these a message, over a
+// connection of its own to the keeper's socket (AF_UNIX, SOCK_SEQPACKET). With a wait come the descriptors that may end
+// it, as SCM_RIGHTS. Each wait and each hello is answered, once this thread is to go on, by a Turn.
 #pragma once
 
 #include <cstdint>

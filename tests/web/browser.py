@@ -1,8 +1,7 @@
 """Drives a headless Chromium over the pipe of its DevTools protocol (https://chromedevtools.github.io/devtools-protocol).
 
-The browser gets a profile, a policy and serial ports of its own: every page of ALLOWED may use every port without a
-click, and the ports are the links of a folder (ports.c). Its policy folder is in /etc, so it is started in a mount
-namespace where another one lies there.
+The browser gets a profile, a policy and serial ports of its own: every page of ALLOWED may use every port without a click, and the ports
+are the links of a folder (ports.c). Its policy folder is in /etc, so it is started in a mount namespace where another one lies there.
 
 real time: a browser. Waits are for what it says or shows; PATIENCE_s only ends what hangs.
 """

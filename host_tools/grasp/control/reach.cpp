@@ -385,8 +385,7 @@ double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const Gr
   way_mm = std::max(way_mm, outlook.least_mm);
   const double below_cap_mm = travel_below_cap_mm(readings, settings, outlook.coming_mm);
   if (way_mm > below_cap_mm) {
-    // A grip that is too weak gets a short move even then, if the gripper's own limit keeps it below
-    // the cap.
+    // A grip that is too weak gets a short move even then, if the gripper's own limit keeps it below the cap.
     const bool too_weak = !readings.is_alone() && (outlook.exact || outlook.coming_N < WEAK * aim.wanted_N);
     const double short_mm =
         too_weak && limits_itself(settings) ? std::max(outlook.least_mm, whole_steps(SHORT_mm)) : 0.0;

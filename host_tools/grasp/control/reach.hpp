@@ -10,8 +10,7 @@
 
 namespace fingertip {
 
-// Force over width: a power of the indentation. The slopes of closing and opening are learnt from the
-// moves themselves.
+// Force over width: a power of the indentation. The slopes of closing and opening are learnt from the moves themselves.
 class GripRubber {
 public:
   // One fingertip touches at this width; both do.
@@ -108,8 +107,7 @@ public:
   double least_move_N(double force_N) const;
   // The predicted grip at the width that was last sent.
   double coming_N(const GripReadings &readings, double now_s) const;
-  // The furthest whole step from the width last sent that keeps the larger of both forces below the
-  // cap.
+  // The furthest whole step from the width last sent that keeps the larger of both forces below the cap.
   double last_below_cap_mm(const GripReadings &readings, const GripSettings &settings) const;
   // The nearest width within all caps.
   double allowed(double width_mm, const GripReadings &readings, const GripSettings &settings,

@@ -52,9 +52,8 @@ struct GripSettings {
     return mass_kg > 0.0 ? std::min(std::max(margin * expected_N(false) / friction, floor_N), cap_N) : start_N;
   }
   double unseen_N() const { return std::max(blind_N, first_N()); }
-  // A set force: the same grip at the start, later and without a load. While there is no load, the
-  // controller holds the nearest force that the gripper reaches, not the least that is enough.
-  // Forces this far apart are alike.
+  // A set force: the same grip at the start, later and without a load. While there is no load, the controller holds the
+  // nearest force that the gripper reaches, not the least that is enough. Forces this far apart are alike.
   double alike_N(double force_N) const { return std::max(differ * force_N, 2.0 * touch_N); }
   bool sets_force() const { return start_N == floor_N && start_N == blind_N && mass_kg == 0.0; }
 };

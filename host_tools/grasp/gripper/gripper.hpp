@@ -6,9 +6,8 @@
 //   gripper->move({.width_mm = 20, .speed_mm_s = 50, .force_N = 20});
 //   GripperStatus now = gripper->poll();
 //
-// No function waits longer than one exchange on the line, unless its comment states otherwise. GripperWay
-// has the timeout of an exchange. To wait for the end of a motion, poll for it. Not for two threads
-// at once.
+// No function waits longer than one exchange on the line, unless its comment states otherwise. GripperWay has the
+// timeout of an exchange. To wait for the end of a motion, poll for it. Not for two threads at once.
 //
 // A function throws Error for these reasons, unless its comment has its own list:
 //   gripper_silent    no answer in time; the next call may have one
@@ -27,8 +26,7 @@
 
 namespace fingertip {
 
-/* The driver of a gripper, and so its kind: a screw drive behind Modbus registers, or a servo that
- * turns a jaw. */
+/* The driver of a gripper, and so its kind: a screw drive behind Modbus registers, or a servo that turns a jaw. */
 enum class GripperDriver { robotiq, feetech };
 
 struct GripperTraits {
@@ -68,9 +66,8 @@ public:
   virtual const GripperTraits &traits() const = 0;
   // What the line is and what limits it, for people: "Modbus RTU at 115200 baud, slave 9, ...".
   virtual std::string line() const = 0;
-  // Begins the activation that the gripper needs before it moves. It drops what it holds and clears
-  // its faults. poll reports when it is done. Nothing else ever activates it, or clears a fault.
-  // Takes some exchanges, 0.1 s.
+  // Begins the activation that the gripper needs before it moves. It drops what it holds and clears its faults. poll
+  // reports when it is done. Nothing else ever activates it, or clears a fault. Takes some exchanges, 0.1 s.
   virtual void activate() = 0;
   virtual GripperStatus poll() = 0;
   // Sends and polls in one exchange where the line can do that, else in two. A gripper that is not
@@ -98,9 +95,8 @@ std::string gripper_model_names();
 // Throws Error: bad_value, an unknown model.
 const GripperTraits &gripper_traits(const std::string &model);
 
-// Asks it for its status, commands nothing. Also throws Error: bad_value, an unknown model or
-// impossible counts; no_port, not_a_port, port_in_use, permission_denied, cannot_open. Takes up to
-// five exchanges.
+// Asks it for its status, commands nothing. Also throws Error: bad_value, an unknown model or impossible counts;
+// no_port, not_a_port, port_in_use, permission_denied, cannot_open. Takes up to five exchanges.
 std::unique_ptr<Gripper> open_gripper(const GripperWay &way);
 
 } // namespace fingertip

@@ -34,11 +34,10 @@ Model robotiq_traits(const char *model, double stroke_mm, double deadband_mm, Ra
           driven_by<RobotiqGripper>};
 }
 
-/* Strokes, speeds and forces: Robotiq, "2F-85 & 2F-140 Instruction Manual" and "Hand-E Instruction
- * Manual", section Specifications. Steps: stroke over the counts of gPO between the ends, which
- * Robotiq's knowledge base (encoder bytes of the adaptive gripper) gives as 3 and 230 for the
- * 2F-85 and which are taken for the other two. Deadband: Kinova's ros2_kortex, issue 227. Exchange:
- * 200 Hz by the manuals. Latencies are assumptions; no figure is public. */
+/* Strokes, speeds and forces: Robotiq, "2F-85 & 2F-140 Instruction Manual" and "Hand-E Instruction Manual", section
+ * Specifications. Steps: stroke over the counts of gPO between the ends, which Robotiq's knowledge base (encoder bytes
+ * of the adaptive gripper) gives as 3 and 230 for the 2F-85 and which are taken for the other two. Deadband: Kinova's
+ * ros2_kortex, issue 227. Exchange: 200 Hz by the manuals. Latencies are assumptions; no figure is public. */
 const std::vector<Model> &models() {
   static const std::vector<Model> all = {
       robotiq_traits("2f85", 85.0, 0.4, {20.0, 150.0}, {20.0, 235.0}),

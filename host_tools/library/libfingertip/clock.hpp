@@ -1,17 +1,14 @@
-/* The host's clock: the one place where the library and the tool read the time, wait and start
- * threads that wait.
+/* The host's clock: the one place where the library and the tool read the time, wait and start threads that wait.
  *
  *   HostTime limit = host_now() + 250ms;
  *   pollfd port = {fd, POLLIN, 0};
  *   if (wait_for(&port, 1, limit) > 0) ...
  *
- * Nothing else in the host programs calls steady_clock::now, poll with a timeout, a sleep or a
- * timed wait of a condition variable. So another implementation of this header, chosen by the
- * linker, is all that a test needs to run whole programs on simulated time
- * (tests/support/simulated_clock.cpp). Under such a clock one thread runs at a time, and time
- * passes only while all of them wait here: never wait while holding a lock that another thread
- * needs before it waits itself.
- */
+ * Nothing else in the host programs calls steady_clock::now, poll with a timeout, a sleep or a timed wait of a
+ * condition variable. So another implementation of this header, chosen by the linker, is all that a test needs to run
+ * whole programs on simulated time (tests/support/simulated_clock.cpp). Under such a clock one thread runs at a time,
+ * and time passes only while all of them wait here: never wait while holding a lock that another thread needs before it
+ * waits itself. */
 #pragma once
 
 #include <chrono>

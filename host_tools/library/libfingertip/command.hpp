@@ -28,8 +28,7 @@ wire_packet command_keep(bool keep); /* the present settings, or none */
 wire_packet command_pad(const pad_profile &profile);
 wire_packet command_erase_pad();
 
-/* Settings as people type them, "rate=20" or "prior=3.1:0.5". firmware/wire/line.toml lists them
- * with their ranges. */
+/* Settings as people type them, "rate=20" or "prior=3.1:0.5". firmware/wire/line.toml lists them with their ranges. */
 struct Setting;
 using SettingValues = std::array<double, 2>; /* in the units of the packet */
 struct WantedSetting {
@@ -38,8 +37,7 @@ struct WantedSetting {
 };
 /* Throws Error if it is no setting, no number or out of range. */
 WantedSetting setting_from_text(const std::string &text);
-/* The commands for these settings. A value that travels with a wanted one, and is not wanted, stays
- * as it is now. */
+/* The commands for these settings. A value that travels with a wanted one, and is not wanted, stays as it is now. */
 std::vector<wire_packet> setting_commands(const std::vector<WantedSetting> &wanted, const wire_info &now);
 /* "rate=20.000 osr=1024 ...": the settings that this firmware has. */
 std::string settings_text(const wire_info &info);

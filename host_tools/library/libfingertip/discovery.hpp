@@ -1,5 +1,4 @@
-/* Finds fingertips in the list of USB devices of Linux, and in the environment. Nothing is opened.
- */
+/* Finds fingertips in the list of USB devices of Linux, and in the environment. Nothing is opened. */
 #pragma once
 
 #include <optional>
@@ -22,8 +21,7 @@ struct Found {
   std::string socket = ""; /* of its server; find_usb and find_in_environment do not ask */
 };
 
-/* Devices with our USB ids, sorted by serial number. root: where to look for sys/ and dev/, "/"
- * except in tests. */
+/* Devices with our USB ids, sorted by serial number. root: where to look for sys/ and dev/, "/" except in tests. */
 std::vector<Found> find_usb(const std::string &root = "/");
 
 /* Of a board that runs its boot ROM, as BOOTSEL makes it: which, and what to do. Empty: there is none. */

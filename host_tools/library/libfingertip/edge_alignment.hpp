@@ -5,10 +5,9 @@
  * if both rise or both fall, and the recorder places them as near as it must, and no others. So
  * edges are no help that follow one another faster than the recorder can distinguish.
  *
- * One fingertip is the reference. Its time goes to the recorder's clock along a line with knots, a
- * second apart, each set by the estimate of the moment, ahead of the rows. So a time of the
- * reference has one place, whenever a row with it comes. The others' times go to the reference's by
- * a ClockFit. */
+ * One fingertip is the reference. Its time goes to the recorder's clock along a line with knots, a second apart, each
+ * set by the estimate of the moment, ahead of the rows. So a time of the reference has one place, whenever a row with
+ * it comes. The others' times go to the reference's by a ClockFit. */
 #pragma once
 
 #include "libfingertip/clock_fit.hpp"

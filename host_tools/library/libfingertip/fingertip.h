@@ -1,26 +1,23 @@
-/* libfingertip in C, for programs in other languages: bytes of a fingertip's line to numbers and
- * back, recordings, clocks, names. It opens no port and no file. The caller moves the bytes, on any
- * thread, in any loop.
+/* libfingertip in C, for programs in other languages: bytes of a fingertip's line to numbers and back, recordings,
+ * clocks, names. It opens no port and no file. The caller moves the bytes, on any thread, in any loop.
  *
  * Handles. A _new function makes a handle, and _free ends it. _free accepts NULL. Two threads may
  * use two handles at once, but never one handle. Functions without a handle may run on any thread.
  *
- * Memory. Buffers belong to the caller. The library keeps no pointer to them. Returned strings
- * belong to the library: names for good, fingertip_error until the thread's next call. Functions
- * that write a text work as snprintf: they cut the text to size - 1 characters, end it with a zero,
- * and return its whole length.
+ * Memory. Buffers belong to the caller. The library keeps no pointer to them. Returned strings belong to the library:
+ * names for good, fingertip_error until the thread's next call. Functions that write a text work as snprintf: they cut
+ * the text to size - 1 characters, end it with a zero, and return its whole length.
  *
  * Errors. No C++ exception leaves the library. A function that can fail returns a status, negative
  * for failure. fingertip_error then has one line about it. Outputs are written on success only.
  *
- * Numbers. A packet is an array of doubles in the order of its fields. fingertip_field_of gives the
- * order. The first two numbers are in every packet: sequence, which counts the packets of a sender
- * modulo 65536, and t_us, microseconds on its clock since its start. A double holds every number of
- * a packet exactly, a count of microseconds up to 2^53, which is 285 years. A text is the codes of
- * 16 characters, zeros behind. Fields with an element for each sensor have FINGERTIP_SENSORS_MOST
- * elements. The first sensor_count of them are of sensors. A field whose flag is off is 0.
- * PROTOCOL.md explains the fields. Their names end with their units: mm, N, Pa, us; q10 are 1/1024,
- * cC 1/100 of a degree Celsius. */
+ * Numbers. A packet is an array of doubles in the order of its fields. fingertip_field_of gives the order. The first
+ * two numbers are in every packet: sequence, which counts the packets of a sender modulo 65536, and t_us, microseconds
+ * on its clock since its start. A double holds every number of a packet exactly, a count of microseconds up to 2^53,
+ * which is 285 years. A text is the codes of 16 characters, zeros behind. Fields with an element for each sensor have
+ * FINGERTIP_SENSORS_MOST elements. The first sensor_count of them are of sensors. A field whose flag is off is 0.
+ * PROTOCOL.md explains the fields. Their names end with their units: mm, N, Pa, us; q10 are 1/1024, cC 1/100 of a
+ * degree Celsius. */
 #ifndef LIBFINGERTIP_FINGERTIP_H
 #define LIBFINGERTIP_FINGERTIP_H
 
@@ -80,8 +77,7 @@ size_t fingertip_value_count(uint8_t type);
  * fingertip_value_count. FINGERTIP_ERR_VALUE names the field. */
 enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count, uint8_t *frame, size_t size,
                                        size_t *length);
-/* The command info in another version of the protocol: a fingertip that speaks that version
- * answers. */
+/* The command info in another version of the protocol: a fingertip that speaks that version answers. */
 enum fingertip_status fingertip_encode_info_of(uint8_t version, uint8_t *frame, size_t size, size_t *length);
 
 /* ---- Bytes of a line to packets */
@@ -102,12 +98,11 @@ struct fingertip_decoder;
 struct fingertip_decoder *fingertip_decoder_new(void); /* NULL: out of memory */
 void fingertip_decoder_free(struct fingertip_decoder *decoder);
 
-/* Takes bytes as they come, cut anywhere. For each packet that they complete it writes 1 + n
- * numbers to values, one packet behind the other: its type, then its n =
- * fingertip_value_count(type). *filled: count of all numbers. Returns how many bytes were taken;
- * fewer than length where values is full: use what is there, and call again with the rest. size: 1
- * + FINGERTIP_VALUES_MOST at least, else none is taken. A receiver that joins gets only the end of
- * the first frame, which counts as nothing. */
+/* Takes bytes as they come, cut anywhere. For each packet that they complete it writes 1 + n numbers to values, one
+ * packet behind the other: its type, then its n = fingertip_value_count(type). *filled: count of all numbers. Returns
+ * how many bytes were taken; fewer than length where values is full: use what is there, and call again with the rest.
+ * size: 1 + FINGERTIP_VALUES_MOST at least, else none is taken. A receiver that joins gets only the end of the first
+ * frame, which counts as nothing. */
 size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes, size_t length, double *values,
                               size_t size, size_t *filled);
 /* The line was interrupted: join again, and expect no particular sequence number. */
@@ -169,9 +164,8 @@ struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format
                                                     int64_t host_zero_us, const char *comments);
 void fingertip_writer_free(struct fingertip_writer *writer);
 
-/* A packet of a device, 0 in a recording of one. host_us: its time on the recorder's clock, for a
- * recording of several alone. A contact packet waits for the raw packet of its frame where the
- * fingertip sends both. */
+/* A packet of a device, 0 in a recording of one. host_us: its time on the recorder's clock, for a recording of several
+ * alone. A contact packet waits for the raw packet of its frame where the fingertip sends both. */
 enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, size_t device, uint8_t type,
                                               const double *values, size_t count, double host_us);
 /* "gone ..." and "back ..." with the time: the port vanished, and was there again. */

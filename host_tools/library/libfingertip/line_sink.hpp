@@ -1,5 +1,4 @@
-/* Where the lines of a recording go: a CSV file, or an MCAP file (mcap_recording.hpp) if its name
- * ends with .mcap. */
+/* Where the lines of a recording go: a CSV file, or an MCAP file (mcap_recording.hpp) if its name ends with .mcap. */
 #pragma once
 
 #include "libfingertip/output_file.hpp"

@@ -1,6 +1,5 @@
-/* ROS 2 messages of a fingertip's reports, without ROS: their definitions, with the meaning of the
- * numbers (host_tools/python/fingertip/msg), and their CDR bytes. They have no header: "frame_id"
- * and time are apart. */
+/* ROS 2 messages of a fingertip's reports, without ROS: their definitions, with the meaning of the numbers
+ * (host_tools/python/fingertip/msg), and their CDR bytes. They have no header: "frame_id" and time are apart. */
 #pragma once
 
 #include "libfingertip/packet_fields.hpp"
@@ -18,12 +17,10 @@ namespace fingertip::ros {
 /* The definitions of messages by their names, "geometry_msgs/Wrench", as the files .msg have them. */
 const std::map<std::string, std::string> &definitions();
 
-/* The schema of a message such as "geometry_msgs/WrenchStamped", with all that it needs, in the
- * encoding ros2msg. */
+/* The schema of a message such as "geometry_msgs/WrenchStamped", with all that it needs, in the encoding ros2msg. */
 std::string schema_of(const std::string &name);
 
-/* A name for topics and coordinate frames, which hold letters, digits and _, and begin with no
- * digit. */
+/* A name for topics and coordinate frames, which hold letters, digits and _, and begin with no digit. */
 std::string name_in_ros(const std::string &serial);
 
 /* The latest time that a message can hold, ns since 1970. */

@@ -2,8 +2,7 @@
  * pseudo-terminal; any path will do.
  *
  * The port is held exclusively while open. It is raw from the first moment, so that the system
- * neither echoes nor changes a byte.
- */
+ * neither echoes nor changes a byte. */
 #pragma once
 
 #include "libfingertip/descriptor_transport.hpp"

@@ -1,11 +1,8 @@
-/* The serving end of a port: simulated fingertips and grippers speak through it. It is a
- * pseudo-terminal, raw from the first moment, which SerialTransport opens like a serial port. Under
- * simulated time a Unix socket takes its place, because a thread of the kernel passes on the bytes
- * of a pseudo-terminal, in real time.
+/* The serving end of a port: simulated fingertips and grippers speak through it. It is a pseudo-terminal, raw from the
+ * first moment, which SerialTransport opens like a serial port. Under simulated time a Unix socket takes its place,
+ * because a thread of the kernel passes on the bytes of a pseudo-terminal, in real time.
  *
- * One program at a time can open it. The next program finds none of the bytes that the last one
- * left unread.
- */
+ * One program at a time can open it. The next program finds none of the bytes that the last one left unread. */
 #pragma once
 
 #include "libfingertip/clock.hpp"
@@ -37,8 +34,7 @@ public:
   /* The number of bytes that were taken, perhaps not all. While no program has the port open, all
    * are taken and lost. Never waits. */
   std::size_t write(const std::uint8_t *bytes, std::size_t length);
-  /* How many written bytes the other program has not read yet; 0 or more: a socket counts its own
-   * overhead too. */
+  /* How many written bytes the other program has not read yet; 0 or more: a socket counts its own overhead too. */
   std::size_t unread() const;
   /* The speed that the other program has set, a constant of termios; 0 for a socket. */
   unsigned speed() const;

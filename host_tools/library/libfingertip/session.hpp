@@ -56,8 +56,7 @@ public:
   /* Takes packets, and waits at most this long for the first. */
   Transport::Result poll(std::chrono::milliseconds timeout);
 
-  /* Returns once the fingertip has done it. Throws Error if it refuses or does not answer, Gone,
-   * Interrupted. */
+  /* Returns once the fingertip has done it. Throws Error if it refuses or does not answer, Gone, Interrupted. */
   void command(const wire_packet &command, Policy policy);
   void command(const wire_packet &command) { this->command(command, Policy()); }
 

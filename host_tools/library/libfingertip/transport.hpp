@@ -1,6 +1,5 @@
 /* Where the bytes of a fingertip come from: a serial port or pseudo-terminal
- * (serial_transport.hpp), libusb (usb_transport.hpp), or its server (share_socket.hpp).
- */
+ * (serial_transport.hpp), libusb (usb_transport.hpp), or its server (share_socket.hpp). */
 #pragma once
 
 #include <chrono>

@@ -1,6 +1,5 @@
-/* Firmware images as cmake/bin2uf2.py writes them: UF2 (https://github.com/microsoft/uf2) for the
- * boot ROM of the RP2040 (its datasheet, 2.8.4). The boot ROM takes any well-formed block without a
- * look at its content. */
+/* Firmware images as cmake/bin2uf2.py writes them: UF2 (https://github.com/microsoft/uf2) for the boot ROM of the
+ * RP2040 (its datasheet, 2.8.4). The boot ROM takes any well-formed block without a look at its content. */
 #pragma once
 
 #include <cstdint>

@@ -177,8 +177,7 @@ private:
     bool waiting;
   };
 
-  /* A context of its own: one that lives through a reconnection sees new devices only where udev
-   * runs. */
+  /* A context of its own: one that lives through a reconnection sees new devices only where udev runs. */
   Link() {
     if (libusb_init(&context_) != 0) {
       context_ = nullptr;

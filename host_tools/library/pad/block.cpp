@@ -59,9 +59,8 @@ Wave solution(int n, double kz, double kh, double b) {
 // Waves of a lift exp(i k . x) have two parts. The first is the displacement of a half-space above
 // the base, in closed form,
 //   u_z = (1 + k z / b) exp(-k z),  u_r = -k z / b exp(-k z),  b = 3 - 4 nu
-// The rest has no displacement at the base, and takes the stress from the surface: (1, -+1) exp(-+k
-// z) and the terms of Papkovich and Neuber, with four constants for each k. The rest falls as
-// exp(-k h), so its integrals over k are short.
+// The rest has no displacement at the base, and takes the stress from the surface: (1, -+1) exp(-+k z) and the terms of
+// Papkovich and Neuber, with four constants for each k. The rest falls as exp(-k h), so its integrals over k are short.
 class PointLift {
 public:
   // At these heights above the base (0..thickness), for distances from r_min_mm to r_max_mm.
@@ -181,8 +180,7 @@ Quadrature gauss(int count) {
   return {solver.eigenvalues(), 2.0 * solver.eigenvectors().row(0).transpose().cwiseAbs2()};
 }
 
-// Values (or derivatives) at s, in -1..1, of the polynomials that are 1 at one of the nodes and 0
-// at the others.
+// Values (or derivatives) at s, in -1..1, of the polynomials that are 1 at one of the nodes and 0 at the others.
 Vector lagrange(const Vector &nodes, double s, bool derivative) {
   const Index n = nodes.size();
   Vector made(n);
@@ -302,8 +300,7 @@ void along_z(const Matrix &by, const Shape &from, const Vector &in, Vector &out,
 
 using Field = std::array<Vector, 3>;
 
-// A quarter of the block, x and y from 0 on, for fields that are even or odd: as the vertical
-// displacement is.
+// A quarter of the block, x and y from 0 on, for fields that are even or odd: as the vertical displacement is.
 class Quarter {
 public:
   Quarter(const Line &x, const Line &y, const Line &z, bool odd_x, bool odd_y, double lame)

@@ -9,10 +9,9 @@
 //   6 mm                    0.4 and 1.2 %, 1 % under a cube
 // The middle alone costs three to five times that. Nodes 0.5 mm apart add less than 0.05 %.
 //
-// The spread of a contact's pressure about its middle is that of the layer without end. Near an
-// edge rubber yields more, so an object presses less on that side than on the layer. Its axis is
-// then not at its pressure's middle, which is the place here. The distance between the two is
-// unknown.
+// The spread of a contact's pressure about its middle is that of the layer without end. Near an edge rubber yields
+// more, so an object presses less on that side than on the layer. Its axis is then not at its pressure's middle, which
+// is the place here. The distance between the two is unknown.
 #pragma once
 
 #include "library/pad/block.hpp"
@@ -34,8 +33,7 @@ public:
     double force_N = 0.0, x_N = 0.0, y_N = 0.0; // down, along x, along y
     double radius_mm = 0.0;                     // of the contact
   };
-  // On the base at a sensor, in the order given, by a load at this place. Beyond the sides, as at
-  // them. Some 0.2 us.
+  // On the base at a sensor, in the order given, by a load at this place. Beyond the sides, as at them. Some 0.2 us.
   double added_Pa(std::size_t sensor, const Load &load, double x_mm, double y_mm) const;
 
   const Block &block() const { return block_; }

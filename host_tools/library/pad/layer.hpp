@@ -16,8 +16,7 @@
 // t about itself, with more pressure ahead of it, as much less behind, and no force. (Plane or
 // axisymmetric Navier equations with u = 0 at z = 0; the tests solve them numerically.)
 //
-// Left out: the pad's edges (block.hpp), large strain, the sensors' own stiffness in the base, and
-// time (effects.hpp).
+// Left out: the pad's edges (block.hpp), large strain, the sensors' own stiffness in the base, and time (effects.hpp).
 #pragma once
 
 namespace fingertip::twin {
@@ -28,9 +27,8 @@ struct Layer {
   double poisson; // below 0.5
 };
 
-// Young's modulus from Shore A hardness: Gent, "On the relation between indentation hardness and
-// Young's modulus", Rubber Chemistry and Technology 31 (1958). 0.56 MPa at 15 A, the rubber of De
-// Clercq et al., RA-L 2022.
+// Young's modulus from Shore A hardness: Gent, "On the relation between indentation hardness and Young's modulus",
+// Rubber Chemistry and Technology 31 (1958). 0.56 MPa at 15 A, the rubber of De Clercq et al., RA-L 2022.
 double youngs_modulus_Pa(double shore_a);
 
 // Silicone rubber of Shore 15 A, nu = 0.49: nearly incompressible. Closer to 0.5 the pressure on

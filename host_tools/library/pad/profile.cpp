@@ -86,9 +86,8 @@ void check(const char *what, double value, double least, double greatest) {
   }
 }
 
-// Variance of the foot's pressure along an axis, mm^2: a^2 / 5 of a disc of radius a under Hertz's
-// pressure. A sphere of 15 mm under 1 to 6 N makes 2.1 to 3.5 mm on the twin's silicone: 0.8 to 2.5
-// mm^2, and more on softer rubber.
+// Variance of the foot's pressure along an axis, mm^2: a^2 / 5 of a disc of radius a under Hertz's pressure. A sphere
+// of 15 mm under 1 to 6 N makes 2.1 to 3.5 mm on the twin's silicone: 0.8 to 2.5 mm^2, and more on softer rubber.
 constexpr double SPREAD_mm2 = 2.0, SPREAD_SD_mm2 = 1.5;
 // Sessions of the twin with memories, a dip, sensors off their places: their widths differ so (unit.pad_thickness).
 constexpr double SESSION_SD = 0.02;
@@ -149,9 +148,8 @@ pad_profile profile_of(const Shape &shape, const wire_info &info) {
     profile.tangential[j] = {static_cast<float>(h_mm * TANGENTIAL[j].strength),
                              static_cast<float>(h_mm * TANGENTIAL[j].sd)};
   }
-  // A contact of radius a under Hertz's pressure, sqrt(1 - r^2/a^2), has a variance of a^2/5 along
-  // an axis: 4 mm^2 at 4.5 mm, and 10 mm^2, an sd more, at the 7 mm that a sphere of 15 mm makes
-  // under 10 N on 12 mm of silicone.
+  // A contact of radius a under Hertz's pressure, sqrt(1 - r^2/a^2), has a variance of a^2/5 along an axis: 4 mm^2 at
+  // 4.5 mm, and 10 mm^2, an sd more, at the 7 mm that a sphere of 15 mm makes under 10 N on 12 mm of silicone.
   profile.spread_mm2 = 4;
   profile.spread_sd_mm2 = 6;
   profile.force_ratio = static_cast<float>(force_ratio(profile, info));

@@ -1,9 +1,8 @@
 // How a pad's rubber spreads a press and a pull: the profile for the fingertip's estimate of
 // tangential force (firmware/common/pad_profile.h), from the pad's thickness.
 //
-// The base pressure under one bonded layer is known wave by wave (pad/layer.hpp): T(H) of a press,
-// Q(H) of a pull, H = wave number times thickness. The profile has a sum of Gaussians for each,
-// which are Gaussians on the base too:
+// The base pressure under one bonded layer is known wave by wave (pad/layer.hpp): T(H) of a press, Q(H) of a pull, H =
+// wave number times thickness. The profile has a sum of Gaussians for each, which are Gaussians on the base too:
 //   T(H) = sum share_j exp(-(H sd_j)^2 / 2),    Q(H) / H = sum moment_j exp(-(H sd_j)^2 / 2)
 // They are fitted by least squares over the plane, that is of the error squared times H dH. By
 // Parseval's theorem that is the error of the pressure itself. With two terms for T and three for Q
@@ -36,9 +35,8 @@ pad_profile profile_over_own_sensors(const Shape &shape);
 // The sensors of this build, as profile_of takes them.
 wire_info own_sensors();
 
-// So little overhang that the tangential force stays doubtful even after the correction of edges_of
-// (pad/edges.hpp): less than half a thickness (blocks of 12 mm in the report's part shear, no real
-// pad).
+// So little overhang that the tangential force stays doubtful even after the correction of edges_of (pad/edges.hpp):
+// less than half a thickness (blocks of 12 mm in the report's part shear, no real pad).
 bool edges_spoil_the_zero(const Shape &shape);
 
 // The thickness of a pad's rubber, from the width of its response to a usual contact.
@@ -48,8 +46,7 @@ bool edges_spoil_the_zero(const Shape &shape);
 // calibration finds determines the thickness. It is uncertain by what is not known of the foot's spread,
 // which counts more on thin rubber: 4 % on 12 mm, some 12 % on 6 mm.
 //
-// On pads of the twin it is right within 2 % from 9 to 15 mm, with a dip or without (test
-// unit.pad_thickness).
+// On pads of the twin it is right within 2 % from 9 to 15 mm, with a dip or without (test unit.pad_thickness).
 struct Thickness {
   double mm, sd_mm;
   double shown_mm() const;               // as text_of shows it, so that a profile has the thickness that was shown

@@ -7,8 +7,7 @@
  * - A command goes on as it came, except for the streams that it asks for. Its acknowledgement, and
  *   the info or health after it, go to its client alone, under the command's own number.
  * - Packets are numbered for each client. Packet loss on the line shows to all clients. Packets
- *   that one client does not take in time are lost to that client alone. Damaged frames go to all.
- */
+ *   that one client does not take in time are lost to that client alone. Damaged frames go to all. */
 #pragma once
 
 #include "libfingertip/clock.hpp"
@@ -28,8 +27,7 @@ public:
   using Client = std::uint64_t; /* never the same twice */
   using Time = HostTime;
 
-  /* What waits for a client at most: three seconds of both streams of fifteen sensors at 1308
-   * frames/s, 336 kB/s. */
+  /* What waits for a client at most: three seconds of both streams of fifteen sensors at 1308 frames/s, 336 kB/s. */
   static constexpr std::size_t QUEUE_BYTES = 1 << 20;
   /* Commands that the line has not answered in the last second, at most: a few writes of what the
    * system's serial driver takes sixteen of without waiting. */

@@ -6,10 +6,9 @@
  *     server.step(500ms);
  *   }
  *
- * It has one thread, which sleeps in poll(2) until a line or a client sends something. A
- * signal wakes it. A socket exists while its fingertip is there. When the fingertip goes, its
- * clients get all packets until then and the end of their connections, as if their own port had
- * vanished. */
+ * It has one thread, which sleeps in poll(2) until a line or a client sends something. A signal wakes it. A socket
+ * exists while its fingertip is there. When the fingertip goes, its clients get all packets until then and the end of
+ * their connections, as if their own port had vanished. */
 #pragma once
 
 #include "libfingertip/connection.hpp"

@@ -68,8 +68,7 @@ template <int N> struct Axis {
     kappa = alpha + mean;
   }
 
-  // g = exp(-height ((k - at)^2 - at^2)), decay = exp(-height): 1 at the node k = 0, and each
-  // further one by a product.
+  // g = exp(-height ((k - at)^2 - at^2)), decay = exp(-height): 1 at the node k = 0, and each further one by a product.
   void evaluate(int first, double at, double height, double decay) {
     const double slope = std::exp(2.0 * height * at);
     const double twice = decay * decay;

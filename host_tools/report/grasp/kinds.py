@@ -69,11 +69,7 @@ ROWS = {
 }
 STILL = ("--kind", "gentle", "--still")
 # row of a set force: its options, its controller
-SETS = {
-    "12 s": ((*STILL, "12"), "ours"),
-    "60 s": ((*STILL, "60"), "ours"),
-    "12 s, eq. (5) and (6)": ((*STILL, "12"), "paper"),
-}
+SETS = {"12 s": ((*STILL, "12"), "ours"), "60 s": ((*STILL, "60"), "ours"), "12 s, eq. (5) and (6)": ((*STILL, "12"), "paper")}
 # What one fingertip reports wrongly in a steady hold: for one frame, for ten; the others for good.
 WRONG_SHORT, WRONG = ("frame", "frames", "spike"), ("nothing", "tared", "reboot", "moved_zero", "weak")
 SQUEEZED, SQUEEZED_N = 1.3, 1.0  # the grip rises by both

@@ -38,8 +38,7 @@ public:
   // A tap: the readings of one frame 0.15 s after it was down.
   std::vector<double> tap(const twin::ContactTable &object, double force_N, double x_mm, double y_mm);
 
-  // What a reading from 0.5 to 1 s after a placement is multiplied by, relative to the sensors'
-  // mean.
+  // What a reading from 0.5 to 1 s after a placement is multiplied by, relative to the sensors' mean.
   std::vector<double> settled_gains() const;
 
   const twin::Pad &rubber() const { return pad_; }

@@ -94,8 +94,7 @@ def distribution(values):
 class Measurement:
     """One board at one OSR for some seconds, contact and health packets streamed to a host that reads.
 
-    Fitted frames hold a fit of this moment's pressures; held ones repeat the fit before while the sensors measure their
-    temperature.
+    Fitted frames hold a fit of this moment's pressures; held ones repeat the fit before while the sensors measure their temperature.
     """
 
     def __init__(self, tools, folder, board, osr, path, seconds, commands=()):

@@ -12,16 +12,7 @@ from contacts import FORCE_N, FRICTION, SENSORS, with_tangential
 from measure import stream_of
 from sessions import DIP, LIKE_REAL, USUAL, WEIGHT_N
 from presentation import percent, quantile
-from touches import (
-    LAYER_mm,
-    SEVEN,
-    SHARE,
-    Case,
-    frame_normals,
-    judged,
-    of_all,
-    run,
-)
+from touches import LAYER_mm, SEVEN, SHARE, Case, frame_normals, judged, of_all, run
 
 # name, Q / F, how it came
 LOADS = (

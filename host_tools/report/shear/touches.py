@@ -121,10 +121,7 @@ class Judged:
 
     def claimed(self):
         """63 and 98 % of a normal distribution in the plane are within 1 and 2 standard deviations times the square root of 2."""
-        return {
-            "claimed_percent": percent(self.claims(2.0)),
-            "claimed_surely_percent": percent(self.claims(2.0 * np.sqrt(2.0))),
-        }
+        return {"claimed_percent": percent(self.claims(2.0)), "claimed_surely_percent": percent(self.claims(2.0 * np.sqrt(2.0)))}
 
     def row(self, name):
         row = {"case": name, "touches": len(self.truth)}

@@ -28,8 +28,7 @@ struct Patch : twin::Touch {
 
 class Face {
 public:
-  // Solved once and kept in the cache (contact_table.hpp). Throws std::runtime_error for a name
-  // that there is not.
+  // Solved once and kept in the cache (contact_table.hpp). Throws std::runtime_error for a name that there is not.
   Face(const std::string &name, double layer_mm, const std::filesystem::path &cache);
 
   // Some 5 us for each NODE_mm of a line, 100 us for an area of the pad's size.

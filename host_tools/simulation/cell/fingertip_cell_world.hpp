@@ -16,8 +16,7 @@
 
 namespace fingertip::cell {
 
-// "slick:0.35" or "slick:0.35@1.5": of what size, how long after the lift's end. Throws Error,
-// bad_value.
+// "slick:0.35" or "slick:0.35@1.5": of what size, how long after the lift's end. Throws Error, bad_value.
 struct Planned {
   Event::Kind kind;
   double amount, after_s;

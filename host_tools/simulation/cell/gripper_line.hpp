@@ -10,8 +10,7 @@ namespace fingertip::cell {
 
 class GripperLine {
 public:
-  // At the start it is activated and has this width. random: when the first
-  // exchange is.
+  // At the start it is activated and has this width. random: when the first exchange is.
   GripperLine(const GripperMechanics &mechanics, double width_mm, Random random);
 
   GripperMotion &motion() { return motion_; }

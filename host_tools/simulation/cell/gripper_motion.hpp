@@ -49,8 +49,7 @@ public:
   void activate();
   // Power is lost: the fingers stay, commands do nothing until activate.
   void power_off();
-  // Ignored unless active, or if it repeats the last one; values beyond the traits'
-  // limits are clamped.
+  // Ignored unless active, or if it repeats the last one; values beyond the traits' limits are clamped.
   void move(const GripperMove &move);
   // Stops after the latency where the fingers are then.
   void stop();

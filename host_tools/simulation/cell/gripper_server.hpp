@@ -8,8 +8,7 @@
 //     server.step(1ms);
 //   }
 //
-// Answers come when the bytes of question and answer would have crossed the line, no sooner. One
-// thread at a time.
+// Answers come when the bytes of question and answer would have crossed the line, no sooner. One thread at a time.
 #pragma once
 
 #include "grasp/gripper/gripper.hpp"

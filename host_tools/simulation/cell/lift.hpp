@@ -24,8 +24,7 @@ void be_of_kind(LiftOptions &options, Kind kind);
 // Throws Error, bad_value: the gripper does not open so far.
 void check(const LiftOptions &options);
 
-// Until a signal comes, or its time is over. Throws Error, and std::runtime_error for a face that
-// there is not.
+// Until a signal comes, or its time is over. Throws Error, and std::runtime_error for a face that there is not.
 void lift(const LiftOptions &options, const Place &place);
 
 } // namespace fingertip::cell

@@ -58,8 +58,7 @@ public:
   Fingers(const Fingers &) = delete;
   Fingers &operator=(const Fingers &) = delete;
 
-  // Once they know their zeros, and are shared where they are to be. Throws Error: one cannot
-  // start, or a signal came.
+  // Once they know their zeros, and are shared where they are to be. Throws Error: one cannot start, or a signal came.
   void wait_until_ready();
   // At this time, later than all before; [finger].
   void put(std::int64_t host_us, const std::vector<Pressures> &pressures);

@@ -1,8 +1,7 @@
 /* The whole firmware in this process, on simulated sensors and in simulated time: firmware/app on
  * boards/native. One at a time, since the board is one.
  *
- * The host's end of the line is native_cdc.h. Nothing takes time but the bus and the conversions.
- */
+ * The host's end of the line is native_cdc.h. Nothing takes time but the bus and the conversions. */
 #pragma once
 
 #include "common/pad_profile.h"

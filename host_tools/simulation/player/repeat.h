@@ -17,8 +17,7 @@ bool repeat_begin(const struct wire_info *info);
 /* A tare command was obeyed. */
 void repeat_tare(void);
 
-/* Fills in the contact packet to this raw packet; stages are left as they are. held: no new
- * pressures came. */
+/* Fills in the contact packet to this raw packet; stages are left as they are. held: no new pressures came. */
 void repeat_frame(const struct wire_packet *raw, bool held, struct wire_contact *contact);
 
 #ifdef __cplusplus

@@ -1,12 +1,10 @@
-// Frictionless contact of an indenter with a layer at a given force, and the pressure that reaches
-// the base.
+// Frictionless contact of an indenter with a layer at a given force, and the pressure that reaches the base.
 //
-// Solved on a square periodic grid by conjugate gradients on the pressure with the surface
-// compliance applied by Fourier transform (Polonsky and Keer, "A numerical method for solving rough
-// contact problems based on the multi-level multi-summation and conjugate gradient techniques",
-// Wear 231, 1999). A bonded layer forgets a load within a few thicknesses, so the periodic images
-// need no more than room; what they do is measured by the tests. A soft indenter's own half-space
-// reaches further: there the images change the share of load by some 1 %.
+// Solved on a square periodic grid by conjugate gradients on the pressure with the surface compliance applied by
+// Fourier transform (Polonsky and Keer, "A numerical method for solving rough contact problems based on the multi-level
+// multi-summation and conjugate gradient techniques", Wear 231, 1999). A bonded layer forgets a load within a few
+// thicknesses, so the periodic images need no more than room; what they do is measured by the tests. A soft indenter's
+// own half-space reaches further: there the images change the share of load by some 1 %.
 #pragma once
 
 #include "library/pad/layer.hpp"
@@ -22,8 +20,7 @@ struct Grid {
   double step_mm; // node (i, j) lies at ((i - nodes / 2) step, (j - nodes / 2) step)
 };
 
-// Side long enough for the footprint and three thicknesses on either side, and the reach of a
-// table.
+// Side long enough for the footprint and three thicknesses on either side, and the reach of a table.
 Grid grid_for(const Indenter &indenter, const Layer &layer);
 
 struct Contact {

@@ -1,9 +1,8 @@
 // The pressure on the base under one indenter on one layer, for any force and place: computed once
 // (contact.hpp), kept in a file, interpolated.
 //
-// force_planes.hpp has the range of forces and places; the tests hold it to 0.2 % of the peak of a
-// solution of its own; a flat indenter, whose edge takes hold node by node, needs that much. Some
-// 0.2 us per pressure.
+// force_planes.hpp has the range of forces and places; the tests hold it to 0.2 % of the peak of a solution of its own;
+// a flat indenter, whose edge takes hold node by node, needs that much. Some 0.2 us per pressure.
 #pragma once
 
 #include "library/pad/table_file.hpp"

@@ -85,12 +85,10 @@ Episode lift(const Stage &stage, std::size_t n);
 Episode drag(const Stage &stage, std::size_t n);
 Episode slide(const Stage &stage, std::size_t n);
 Episode screw(const Stage &stage, std::size_t n);
-// The strongest grip of any slide of an object that is at most so heavy and at least so rough, but
-// for --force itself.
+// The strongest grip of any slide of an object that is at most so heavy and at least so rough, but for --force itself.
 double slide_force_N(double mass_kg, double friction, double kinetic_share);
 
-// Gives the nth episode of a kind that is not about pulling the tangential force that the options ask
-// for.
+// Gives the nth episode of a kind that is not about pulling the tangential force that the options ask for.
 void pull(Episode &episode, const Stage &stage, std::size_t n);
 
 } // namespace fingertip::twin

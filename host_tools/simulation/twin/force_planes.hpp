@@ -1,8 +1,7 @@
 // What a contact does to the base around it, for any force and place: planes of values at equal
 // steps of the logarithm of the force, cubic between nodes and between planes.
 //
-// Forces 0..50 N; below 0.02 N a contact is as if at 0.02 N. Places up to 45 mm away; beyond, there
-// is nothing.
+// Forces 0..50 N; below 0.02 N a contact is as if at 0.02 N. Places up to 45 mm away; beyond, there is nothing.
 #pragma once
 
 #include <cstddef>

@@ -15,8 +15,7 @@ double mindlin(double share) { return 1.0 - std::pow(1.0 - share, 1.5); }
 
 HeldObject::HeldObject(double mass_kg, double friction, double kinetic_share)
     : mass_kg_(mass_kg), static_(friction), kinetic_(kinetic_share * friction) {
-  // Straight between as many points of the curve as there are elements; where its slope falls, one
-  // begins to slide.
+  // Straight between as many points of the curve as there are elements; where its slope falls, one begins to slide.
   const auto slope = [](int i) {
     return i == ELEMENTS ? 0.0 : ELEMENTS * (mindlin(double(i + 1) / ELEMENTS) - mindlin(double(i) / ELEMENTS));
   };

@@ -15,11 +15,10 @@
 // Friction: a slider holds its share of mu F. mu falls from the static to the kinetic one within
 // some SETTLES_mm of gross slip and grows back in some HEALS_s of rest,
 //   mu = kinetic + (static - kinetic) h,  dh/dt = (1 - h) / HEALS_s - h u / SETTLES_mm
-// where u is the speed of gross slip: a simple form of the laws of state (Rabinowicz, "The nature
-// of the static and kinetic coefficients of friction", J. Appl. Phys. 22, 1951; Ruina, "Slip
-// instability and state variable friction laws", J. Geophys. Res. 88, 1983). In steady slip it is
-// smooth in the speed. Both constants are assumed, and so is that friction of rubber does not grow
-// with speed, which depends on rubber, object and dirt.
+// where u is the speed of gross slip: a simple form of the laws of state (Rabinowicz, "The nature of the static and
+// kinetic coefficients of friction", J. Appl. Phys. 22, 1951; Ruina, "Slip instability and state variable friction
+// laws", J. Geophys. Res. 88, 1983). In steady slip it is smooth in the speed. Both constants are assumed, and so is
+// that friction of rubber does not grow with speed, which depends on rubber, object and dirt.
 //
 // Assumed besides: where F changes, springs go with the contact's radius and sliders with F, and
 // what is in a spring stays; springs are damped with LOSS_s, a loss factor of 0.1 at 100 rad/s.

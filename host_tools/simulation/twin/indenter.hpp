@@ -1,6 +1,5 @@
-// Contact shapes: the paper's four indenters, spheres, cylinders and cubes of three sizes, and
-// approximations of its five objects (De Clercq et al., RA-L 2022, figures 4 and 5 and tables III and
-// IV).
+// Contact shapes: the paper's four indenters, spheres, cylinders and cubes of three sizes, and approximations of its
+// five objects (De Clercq et al., RA-L 2022, figures 4 and 5 and tables III and IV).
 //
 // The approximations are ours; the paper gives names and pictures, no measures. A body softer than steel
 // yields as an elastic half-space does.

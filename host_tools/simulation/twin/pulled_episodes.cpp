@@ -32,8 +32,7 @@ void aim(Track &track, double angle_rad) {
   track.along_y = track.pull.along_y = std::sin(angle_rad);
 }
 
-// Where a way along the track begins, so that all of it is where random places are; in the middle
-// if it is longer.
+// Where a way along the track begins, so that all of it is where random places are; in the middle if it is longer.
 void place_way(Track &track, double way_mm, const Stage &stage, Random &random) {
   const auto begin = [&](double half_mm, double along_mm) {
     const double middle_mm = std::max(0.0, half_mm - 0.5 * std::abs(along_mm));

@@ -1,10 +1,9 @@
 // Scenarios as files: the scenario that emulator and native pipeline play, and the events in it.
 //
-// FILE.csv is a scenario ("# fingertip-scenario 1", host_tools/simulation/emulator/scenario.mjs): truth, then
-// what each sensor reports above ambient with all effects in it. It is linear between rows.
-// Computed each millisecond of a contact, written where the line through the rows would leave
-// 0.2 Pa + 1e-4 of the largest reading in any sensor (or 0.1 mN + 1e-4 of the force, 2 um,
-// 2 mK), and wherever contact or slip change.
+// FILE.csv is a scenario ("# fingertip-scenario 1", host_tools/simulation/emulator/scenario.mjs): truth, then what each
+// sensor reports above ambient with all effects in it. It is linear between rows. Computed each millisecond of a
+// contact, written where the line through the rows would leave 0.2 Pa + 1e-4 of the largest reading in any sensor (or
+// 0.1 mN + 1e-4 of the force, 2 um, 2 mK), and wherever contact or slip change.
 //   contact    1 while the force is not 0
 //   x_mm y_mm  middle of the contact; of two, their centre of force
 //   force_N    on the pad, of all contacts

@@ -2,9 +2,8 @@
 // the errors of a pad. kinds() lists the kinds; De Clercq et al., RA-L 2022 ("the paper"), section
 // IV, is what they follow. scenario_file.hpp writes them down.
 //
-// Nothing touches the pad for the first START_QUIET_s, nor for quiet_s after each contact: time for
-// the 16 frames of the firmware's tare at 20 frames a second; the paper, too, sets its readings to
-// zero between contacts.
+// Nothing touches the pad for the first START_QUIET_s, nor for quiet_s after each contact: time for the 16 frames of
+// the firmware's tare at 20 frames a second; the paper, too, sets its readings to zero between contacts.
 //
 // README.md says where things are, what the truth calls slip, what a tangential force is of, and what is left out.
 #pragma once
@@ -123,8 +122,7 @@ struct Scenario {
 Block block_around(const Layer &layer, double overhang_mm);
 std::vector<Place> sensor_places();
 
-// With all that was left open filled in. Throws Error for an unknown kind or what is out of
-// range.
+// With all that was left open filled in. Throws Error for an unknown kind or what is out of range.
 ScenarioOptions complete(const ScenarioOptions &options);
 
 // The tables are those of the indenters on the layer: creep and rolling need the contact's size.

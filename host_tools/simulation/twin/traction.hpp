@@ -13,8 +13,7 @@ struct TractionLoad {
   double x_N, y_N;         // Q, along the indenter's own axes
 };
 
-// What stays without sliding when the tangential force has risen to this at a constant normal one;
-// 0 if all slides.
+// What stays without sliding when the tangential force has risen to this at a constant normal one; 0 if all slides.
 inline double stuck_force_N(double force_N, double tangential_N, double friction) {
   return std::max(0.0, force_N - tangential_N / friction);
 }

@@ -15,8 +15,7 @@ constexpr int SIDE = 2 * (NODES - 1);
 
 enum class Axis { x, y };
 
-// Base pressure under a traction along an axis per base pressure under the like pressure, and the
-// transforms' norm.
+// Base pressure under a traction along an axis per base pressure under the like pressure, and the transforms' norm.
 std::vector<std::complex<double>> response(const Transform &transform, const Layer &layer, Axis axis) {
   const double unit = 2.0 * M_PI / (SIDE * ForcePlanes::STEP_mm); // per mm
   std::vector<std::complex<double>> made(transform.waves());

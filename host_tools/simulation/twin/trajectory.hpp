@@ -100,12 +100,11 @@ struct Track {
   Touch at(double t_s) const;
 };
 
-// How far, in radians, a torque turns a sphere of this contact radius on rubber of this shear
-// modulus, a half-space, before it spins: the closed form of Deresiewicz, "Contact of elastic
-// spheres under an oscillating torsional couple", J. Appl. Mech. 21, 1954. torque_share is that of
-// the torque at which all slides, (3 pi / 16) mu F a; -1..1. It is less than Lubkin's integrals
-// ("The torsion of elastic spheres in contact", J. Appl. Mech. 18, 1951) by 3 % at half of that, by
-// 14 % at 0.8; theirs grows beyond any bound at the end, as a logarithm, where this spins.
+// How far, in radians, a torque turns a sphere of this contact radius on rubber of this shear modulus, a half-space,
+// before it spins: the closed form of Deresiewicz, "Contact of elastic spheres under an oscillating torsional couple",
+// J. Appl. Mech. 21, 1954. torque_share is that of the torque at which all slides, (3 pi / 16) mu F a; -1..1. It is
+// less than Lubkin's integrals ("The torsion of elastic spheres in contact", J. Appl. Mech. 18, 1951) by 3 % at half of
+// that, by 14 % at 0.8; theirs grows beyond any bound at the end, as a logarithm, where this spins.
 double wind_up_rad(double torque_share, double friction_N, double shear_modulus_MPa, double radius_mm);
 
 // Share of a disc's area that lies before a straight edge, and how far the centre of that part lies

@@ -13,8 +13,7 @@ public:
   ~Transform();
 
   int nodes() const { return nodes_; }
-  // Waves (i, j) along x and y, of exp(+i k x): [i * (nodes / 2 + 1) + j], j from 0 to nodes / 2,
-  // i as in i_of.
+  // Waves (i, j) along x and y, of exp(+i k x): [i * (nodes / 2 + 1) + j], j from 0 to nodes / 2, i as in i_of.
   std::size_t waves() const;
   int i_of(int row) const { return row <= nodes_ / 2 ? row : row - nodes_; }
 

@@ -1,6 +1,5 @@
 /* One session of finding the gains: a fingertip's packets in, placements, what to do next, and the
- * calibration in the end. For every program that calibrates.
- */
+ * calibration in the end. For every program that calibrates. */
 #pragma once
 
 #include "libfingertip/wire.hpp"

@@ -8,11 +8,9 @@
  * without them, or width and dip alone. It is good then, and reason says what is not known. Refused: what speaks
  * against it does not go away with more placements. More: neither yet.
  *
- * The bounds on evidence lie between what good and bad sessions show: simulated pads of 12 mm,
- * alike and as uneven as real ones (report truth, part calibration, tables evidence_p1_p50_p99; chosen
- * on seeds 5000 to 5011, judged from 20000 on), and the real pad that chooses
- * (host_tools/report/real).
- */
+ * The bounds on evidence lie between what good and bad sessions show: simulated pads of 12 mm, alike and as uneven as
+ * real ones (report truth, part calibration, tables evidence_p1_p50_p99; chosen on seeds 5000 to 5011, judged from
+ * 20000 on), and the real pad that chooses (host_tools/report/real). */
 #pragma once
 
 #include "tool/calibration/solver.hpp"
@@ -95,8 +93,7 @@ struct Judgement {
 /* placements: all of the session, in the order of time. last: there will be no more, so what is not good is refused. */
 Judgement judge(const Array &array, std::vector<Placement> placements, bool last);
 
-/* How far a sensor is from its place, and the log of the width of its response over that of the
- * others. */
+/* How far a sensor is from its place, and the log of the width of its response over that of the others. */
 struct Own {
   double off_x_mm = 0.0, off_y_mm = 0.0, wider = 0.0;
 };
@@ -121,10 +118,9 @@ struct ForceScale {
 std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
                                       const Solution &solution, double force_N, const Shape &shape);
 
-/* What a calibration is for: how far the firmware's fit scatters over the placements, with these
- * gains and this shape. Medians: of the distance of its locations from those of the solution, less what
- * all have in common, of the force's deviation from its median, relative; and the mean of its log's, in which the few
- * that are far off count. */
+/* What a calibration is for: how far the firmware's fit scatters over the placements, with these gains and this shape.
+ * Medians: of the distance of its locations from those of the solution, less what all have in common, of the force's
+ * deviation from its median, relative; and the mean of its log's, in which the few that are far off count. */
 struct Scatter {
   double location_mm = 0.0, force = 0.0, force_mean = 0.0;
 };

@@ -16,8 +16,7 @@ namespace {
 
 constexpr double CHANCE_SDS = 4.0;
 
-/* Mean of frames, and the variances of what is judged, from frame to frame: a change that goes on
- * is none of them. */
+/* Mean of frames, and the variances of what is judged, from frame to frame: a change that goes on is none of them. */
 struct Mean {
   PullFrame mean;
   double count = 0.0, q_variance = 0.0, force_variance = 0.0;
@@ -83,8 +82,7 @@ double sd_without_scale_N(const wire_contact &contact, const pad_profile &pad) {
 
 } // namespace
 
-/* The mean of the last mean_s, if the last span_s of frames are there and nothing goes on in them.
- */
+/* The mean of the last mean_s, if the last span_s of frames are there and nothing goes on in them. */
 std::optional<PullFrame> PullFinder::still(double span_s, double mean_s) const {
   const double begin_s = frames_.back().t_s - span_s;
   if (frames_.front().t_s > begin_s) {

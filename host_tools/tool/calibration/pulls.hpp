@@ -1,11 +1,9 @@
 /* One scale of the tangential force from pulls of one known force: an object is on the pad, is
  * left alone for a moment, then a string pulls it level along the rubber and holds.
  *
- * Of each contact counts what changed between the rest and the pull, so a zero that gains or the
- * pad's edges spoil does not matter. Both are means of half a second and of a second in which
- * nothing moves; an object that slides is pulled by friction and not by what hangs on the string,
- * and is none.
- */
+ * Of each contact counts what changed between the rest and the pull, so a zero that gains or the pad's edges spoil does
+ * not matter. Both are means of half a second and of a second in which nothing moves; an object that slides is pulled
+ * by friction and not by what hangs on the string, and is none. */
 #pragma once
 
 #include "libfingertip/wire.hpp"

@@ -9,11 +9,10 @@
  *                                 - h exp(-R / 2 B^2 S^2) + (t1 u + t2 v) / S P(R / S^2)] + o_k - r_k M_k,
  *   S = s exp(w + b_k),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v
  *
- * One profile for all: peak A, width s, the dip's over it B and mixing m are fitted along, so nothing need be
- * known of the pad or the foot. The mixture of two Gaussians is within 0.33 % of the peak of the
- * pressure under spheres and flat ends on 6, 9 and 12 mm of bonded rubber (the twin's tables, 3 and
- * 10 N), where one Gaussian is off by up to 3.4 %. Widths per placement (w) keep the force,
- * 2 pi A s^2.
+ * One profile for all: peak A, width s, the dip's over it B and mixing m are fitted along, so nothing need be known of
+ * the pad or the foot. The mixture of two Gaussians is within 0.33 % of the peak of the pressure under spheres and flat
+ * ends on 6, 9 and 12 mm of bonded rubber (the twin's tables, 3 and 10 N), where one Gaussian is off by up to 3.4 %.
+ * Widths per placement (w) keep the force, 2 pi A s^2.
  * Cast rubber has a dip (h, of the width B S) around that: -1 to -2 % of the peak three to five widths away, on every
  * pad of host_tools/report/real; bonded rubber in the twin has none.
  *
@@ -22,25 +21,22 @@
  * Assumptions::force) determines them, less surely than the rest. They are the gauge: the
  * subspace of log gains that 1, x, y and x^2 + y^2 span over the sensors.
  *
- * All else that a session may hold is in the model with a prior around nothing, so that it neither
- * passes for a gain nor stays unseen: where the sensors sit (they are soldered by hand), sensors
- * whose response is wider or narrower than that of the others (b), zeros that were off (o), contacts
- * that are not round (q, of all and of each), a pad or a hand aslant (t: tangential force of all
- * placements over their normal force, P as PULL has it). The posterior of each is in the Solution; judge.hpp has
- * the limits. Zeros that move are not in the readings, which are above those just before. What a
- * sensor alone keeps of a press is: of this one it is a constant share, and so part of its gain; of those before (r) it
- * fades between the rest and the readings. It is not much, but without it the dip passes for what it would be
+ * All else that a session may hold is in the model with a prior around nothing, so that it neither passes for a gain
+ * nor stays unseen: where the sensors sit (they are soldered by hand), sensors whose response is wider or narrower than
+ * that of the others (b), zeros that were off (o), contacts that are not round (q, of all and of each), a pad or a hand
+ * aslant (t: tangential force of all placements over their normal force, P as PULL has it). The posterior of each is in
+ * the Solution; judge.hpp has the limits. Zeros that move are not in the readings, which are above those just before.
+ * What a sensor alone keeps of a press is: of this one it is a constant share, and so part of its gain; of those before
+ * (r) it fades between the rest and the readings. It is not much, but without it the dip passes for what it would be
  * elsewhere.
  *
- * How large the spreads of b, e, w, q and of the places are, and the model's own error, is
- * learnt from the session itself (expectation and maximisation, from the Assumptions as the start):
- * sensors that are where they should be determine the gains better than others, with smaller standard
- * deviations.
+ * How large the spreads of b, e, w, q and of the places are, and the model's own error, is learnt from the session
+ * itself (expectation and maximisation, from the Assumptions as the start): sensors that are where they should be
+ * determine the gains better than others, with smaller standard deviations.
  *
  * Robust least squares (Huber) by Levenberg-Marquardt, the placements' own unknowns eliminated; a
  * placement that does not fit the others is dropped as a whole. The same input gives the same
- * bits. Thirty placements of fifteen sensors take some 10 ms.
- */
+ * bits. Thirty placements of fifteen sensors take some 10 ms. */
 #pragma once
 
 #include <cstdint>
@@ -190,8 +186,7 @@ std::vector<double> outside_gauge(const Array &array, const std::vector<double> 
  * 31000). The price is 8 % more location error on 6 mm of rubber. */
 constexpr double INSET_PITCHES = 0.5;
 
-/* Where a placement more would lower the largest shape_sd most: a place on the array, in steps of
- * half a pitch. */
+/* Where a placement more would lower the largest shape_sd most: a place on the array, in steps of half a pitch. */
 struct Wanted {
   double x_mm, y_mm;
   double worst_shape_sd; /* then */

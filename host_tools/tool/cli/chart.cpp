@@ -168,8 +168,7 @@ constexpr float AXIS_RIM_mm = 6.0f; /* beyond the outermost sensors, as the pad 
 /* A doubtful force above this is none: the pads are made for less. */
 constexpr float MOST_N = 50;
 
-/* A tangential force below this is hardly more than its standard deviation: no axis is made for it.
- */
+/* A tangential force below this is hardly more than its standard deviation: no axis is made for it. */
 constexpr float LEAST_PULL_N = 0.5f;
 
 using Sample = Model::Sample;

@@ -40,10 +40,9 @@ void each_shown(const Area &area, std::int64_t last, const std::function<void(st
 /* A row for each at the least and one for the time. */
 void draw_charts(Canvas &canvas, const Area &area, const std::vector<Chart> &charts);
 
-/* Force, x, y and slip below one another, the newest at the right; at least a row for each and one
- * for the time. Where the fingertip knows its pad qx and qy are between, instead of x and y where
- * there is no room for all. What carries a warning is dashed, and left out where it is
- * beyond the axis that the others need. */
+/* Force, x, y and slip below one another, the newest at the right; at least a row for each and one for the time. Where
+ * the fingertip knows its pad qx and qy are between, instead of x and y where there is no room for all. What carries a
+ * warning is dashed, and left out where it is beyond the axis that the others need. */
 void draw_traces(Canvas &canvas, const Area &area, const Model &model);
 /* Of the model, which must outlive it. */
 Curve force_curve(const Model &model);

@@ -1,5 +1,4 @@
-/* Draws the monitor: one fingertip or several side by side, each with its pad, its numbers, and its
- * traces. */
+/* Draws the monitor: one fingertip or several side by side, each with its pad, its numbers, and its traces. */
 #pragma once
 
 #include "tool/cli/canvas.hpp"

@@ -94,9 +94,8 @@ void paint_fit(Picture &picture, const Model &model, const wire_contact &contact
   }
 }
 
-/* Tangential force over normal force as an arrow from the contact: solid as far as it is for sure,
- * around it where it ends but for one standard deviation. A load that may be none is a round spot
- * of that size. */
+/* Tangential force over normal force as an arrow from the contact: solid as far as it is for sure, around it where it
+ * ends but for one standard deviation. A load that may be none is a round spot of that size. */
 struct Arrow {
   float along_x, along_y, length_mm, sd_mm;
   Colour colour;

@@ -1,5 +1,4 @@
-/* Canvases to the bytes that show them on an ANSI terminal, of which only those are sent that
- * change it.
+/* Canvases to the bytes that show them on an ANSI terminal, of which only those are sent that change it.
  * ncurses has no two free colours to a cell, which the pad needs, and does not bracket pastes. */
 #pragma once
 
@@ -19,9 +18,8 @@ class Painter {
 public:
   Painter(ColourDepth depth, Characters characters) : depth_(depth), characters_(characters) {}
 
-  /* What turns the canvas before into this one; everything at first, and where the size changed. In
-   * ASCII halves become whole cells of their mean colour, other shapes the nearest character,
-   * foreign letters '?'. */
+  /* What turns the canvas before into this one; everything at first, and where the size changed. In ASCII halves become
+   * whole cells of their mean colour, other shapes the nearest character, foreign letters '?'. */
   std::string paint(const Canvas &canvas);
 
   /* Nothing is known of what the terminal shows. */

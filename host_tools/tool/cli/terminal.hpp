@@ -12,15 +12,13 @@ namespace fingertip {
 /* SIGINT, SIGTERM and SIGHUP from now on only ask to stop, SIGPIPE is ignored. */
 void catch_signals();
 bool stop_requested();
-/* How often SIGINT came, for programs that do not end by the first, and whether another of these
- * signals did. */
+/* How often SIGINT came, for programs that do not end by the first, and whether another of these signals did. */
 unsigned interrupts();
 bool end_requested();
 
 /* Whether a pipe's other end is still there. */
 bool is_standard_output_read();
-/* Waits until standard output takes at least 4 KiB more; false if it does not and a stop is
- * requested. */
+/* Waits until standard output takes at least 4 KiB more; false if it does not and a stop is requested. */
 bool wait_for_standard_output();
 
 enum class ColourMode { automatic, truecolour, palette_256, plain };

@@ -53,8 +53,7 @@ Verdict worst_of(const std::vector<Finding> &findings);
 /* "ok", "warn", "bad" */
 std::string verdict_text(Verdict verdict);
 
-/* Frames a second that a fingertip with these settings makes; nothing where its board is unknown.
- */
+/* Frames a second that a fingertip with these settings makes; nothing where its board is unknown. */
 std::optional<double> expected_rate_Hz(const wire_info &info);
 
 /* The data sheet's, of one reading at this oversampling, rms; nothing for none of the sensor's. */

@@ -14,8 +14,7 @@ namespace {
 constexpr unsigned MEANS = 10;
 /* The middle of fewer is moved by one of them. */
 constexpr std::size_t COMPANY_MIN = 5;
-/* The median of |x| of a Gaussian of standard deviation 1 is 1 / 1.4826; a step holds two noises.
- */
+/* The median of |x| of a Gaussian of standard deviation 1 is 1 / 1.4826; a step holds two noises. */
 constexpr double NOISE_OF_MEDIAN_STEP = 1.4826 / 1.41421356;
 
 bool has(std::uint32_t bitmap, unsigned sensor) { return (bitmap >> sensor & 1u) != 0; }

@@ -1,5 +1,4 @@
-/* The computer's own facts about a fingertip's port. root: the folder with etc, usr, run, dev and
- * proc. */
+/* The computer's own facts about a fingertip's port. root: the folder with etc, usr, run, dev and proc. */
 #pragma once
 
 #include <string>

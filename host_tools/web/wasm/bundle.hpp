@@ -36,9 +36,8 @@ public:
   // kinetic_share: kinetic friction per static one.
   Bundle(double friction, double kinetic_share);
 
-  // The normal force, the rubber's tangential stiffness under it while nothing slides, the radius
-  // of the contact. Gives what the rubber does to the object. Up to 0.2 ms while nothing slides,
-  // 0.05 ms while all does.
+  // The normal force, the rubber's tangential stiffness under it while nothing slides, the radius of the contact. Gives
+  // what the rubber does to the object. Up to 0.2 ms while nothing slides, 0.05 ms while all does.
   Wrench step(double seconds, double force_N, double stiffness_N_mm, double radius_mm, const Motion &motion);
 
   // Static friction falls or rises to this; kinetic goes along.

@@ -1,5 +1,4 @@
-// The firmware in simulated.wasm, one powered up: its line, its time, what it keeps. For the page's
-// worker and for node.
+// The firmware in simulated.wasm, one powered up: its line, its time, what it keeps. For the page's worker and for node.
 import { start } from './module.mjs';
 
 export class Firmware {

@@ -11,8 +11,7 @@ namespace fingertip {
 
 namespace {
 
-// strtod takes more than std::from_chars does: blanks, "+", hexadecimal, and what is too small to be
-// anything but 0.
+// strtod takes more than std::from_chars does: blanks, "+", hexadecimal, and what is too small to be anything but 0.
 template <typename Number>
 std::optional<Number> parsed(std::string_view text, Number (*convert)(const char *, char **)) {
   if (text.empty() || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos || text[0] == '+') {

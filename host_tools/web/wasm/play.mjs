@@ -1,5 +1,4 @@
-// What fingertip_player does with a scenario, by the firmware in simulated.wasm: the bytes of the
-// line.
+// What fingertip_player does with a scenario, by the firmware in simulated.wasm: the bytes of the line.
 // usage: node play.mjs simulated.wasm SCENARIO.csv COMMANDS OUTPUT.ftr [objects.bin]
 // COMMANDS: those of fingertip_player --commands. With a file of objects its pad is used, 12 mm without
 // ends, as by fingertip_player --pad 12. Prints {"seconds", "cpu_s"}.

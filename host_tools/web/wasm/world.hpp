@@ -55,8 +55,7 @@ public:
 
   // What touched is lifted. Out of range: nothing happens.
   void choose(std::size_t object);
-  // Out of their ranges, all values count as at the end. Values that are not finite: as nothing
-  // happened.
+  // Out of their ranges, all values count as at the end. Values that are not finite: as nothing happened.
   void press(double x_mm, double y_mm, double force_N);
   void hold(double x_mm, double y_mm, double force_N, double load_N, double angle_rad);
   void drop(double x_mm, double y_mm, double mass_kg);

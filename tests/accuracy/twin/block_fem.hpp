@@ -1,7 +1,6 @@
-// A second solution of the block that shares nothing with the first: finite elements of twenty
-// nodes with two by two by two points of integration, which do not lock as the rubber becomes
-// incompressible, under the load itself. A quarter of the block, for loads whose pressure on the
-// base is even or odd in x and y.
+// A second solution of the block that shares nothing with the first: finite elements of twenty nodes with two by two by
+// two points of integration, which do not lock as the rubber becomes incompressible, under the load itself. A quarter
+// of the block, for loads whose pressure on the base is even or odd in x and y.
 #pragma once
 
 #include <Eigen/Sparse>

@@ -13,9 +13,8 @@ constexpr std::uint32_t WARNINGS = 0x7FF00;
 constexpr std::size_t KEPT = 10;
 // The line and its queue take less, where the host reads.
 constexpr std::uint64_t ANSWER_LIMIT_us = 2500000;
-// A weaker touch is little more than noise. One of less than such a part of what was pressed in the
-// last minute the gate may take for a zero that has moved, and say that nothing touches
-// (condition.h).
+// A weaker touch is little more than noise. One of less than such a part of what was pressed in the last minute the
+// gate may take for a zero that has moved, and say that nothing touches (condition.h).
 constexpr double SENSED_Pa = 600, SENSED_SHARE = 0.25;
 constexpr std::uint64_t SENSED_FOR_us = 100000, MEMORY_us = 60000000;
 // A contact may close that late.

@@ -1,5 +1,4 @@
-// What must hold of a fingertip whatever happens to it, judged from its line alone and the truth of
-// what it feels.
+// What must hold of a fingertip whatever happens to it, judged from its line alone and the truth of what it feels.
 //
 //   time     device time and frame numbers only rise; no packet is from the future; uptime is the
 //            time
@@ -10,13 +9,12 @@
 //   answer   an acknowledgement is of a command that was sent, once; stages add up
 //   wrong    a frame without a warning tells the truth within the bounds below
 //
-// A contact of less than a quarter of the strongest in the last minute may go unfelt, for it may be
-// rubber that has not let go yet (condition.h). Bounds of what is said of any: the simulated pad is
-// what the fit takes a contact for, its gains are all 1, and a frame without a warning says that
-// its location is good to 0.6 mm of standard deviation (UNCERTAIN has that limit):
-// LOCATION_BOUND_mm is twice that, FORCE_BOUND what an unwarned corner contact may be off by.
-// READING_BOUND_Pa is what a temperature makes of a reading that is 5 degC wrong: so far from the
-// others a sensor's first one may be (readings.h), 245 Pa a degree; beside the noise.
+// A contact of less than a quarter of the strongest in the last minute may go unfelt, for it may be rubber that has not
+// let go yet (condition.h). Bounds of what is said of any: the simulated pad is what the fit takes a contact for, its
+// gains are all 1, and a frame without a warning says that its location is good to 0.6 mm of standard deviation
+// (UNCERTAIN has that limit): LOCATION_BOUND_mm is twice that, FORCE_BOUND what an unwarned corner contact may be off
+// by. READING_BOUND_Pa is what a temperature makes of a reading that is 5 degC wrong: so far from the others a sensor's
+// first one may be (readings.h), 245 Pa a degree; beside the noise.
 #pragma once
 
 #include "libfingertip/wire.hpp"
@@ -65,8 +63,7 @@ public:
   void close(std::uint64_t t_us);
   void sent(std::uint64_t t_us, const wire_packet &command);
   void received(std::uint64_t t_us, const std::uint8_t *bytes, std::size_t count);
-  // Bits of a conversion's result were inverted on the way, which no check can tell: wrong frames
-  // are counted apart.
+  // Bits of a conversion's result were inverted on the way, which no check can tell: wrong frames are counted apart.
   void excuse_until(std::uint64_t t_us) { excused_until_us_ = t_us; }
   // The supply of a sensor dipped, which a pad that moves hides until its next temperature
   // (readings.h): wrong readings, not frames, are counted apart.

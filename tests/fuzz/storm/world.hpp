@@ -1,6 +1,5 @@
-// What the fingertip senses, and so the truth: touches with rests between, each a Gaussian of
-// pressure, which is what the firmware's fit takes a contact for. So an error of what it reports comes
-// from a fault, or from the noise.
+// What the fingertip senses, and so the truth: touches with rests between, each a Gaussian of pressure, which is what
+// the firmware's fit takes a contact for. So an error of what it reports comes from a fault, or from the noise.
 //
 // Times are of the bench, us since it began. Rows of one step each, linear between; fixed ahead,
 // since a simulated conversion asks for its middle when it begins.

@@ -2,13 +2,11 @@
  * pressure frame and of a temperature frame. Whatever happens, the stream must come back to
  * complete frames, never hang, and never call a pressure valid that is wrong.
  *
- * The pressure on the pad never rests, so that a stale reading is a wrong one, but where a test
- * says so.
+ * The pressure on the pad never rests, so that a stale reading is a wrong one, but where a test says so.
  *
  * One fault is beyond the sensor's protocol: the 24-bit results of conversions carry no check, so
  * bits inverted there go unseen. For these only the return to good frames is demanded: at the next
- * frame, or after the next temperature conversion.
- */
+ * frame, or after the next temperature conversion. */
 #include "app/app.h"
 #include "common/contact_flags.h"
 #include "native/native_cdc.h"

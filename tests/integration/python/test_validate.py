@@ -455,10 +455,7 @@ class Command(ValidateTest):
             self.assertEqual((out, err.count("\n")), ("", 1))
             self.assertTrue(err.startswith("fingertip: ") and words in err, err)
         self.assertEqual(os.listdir(self.folder), [])
-        for options, words in (
-            (["-o", self.folder + "/no/c.html"], "there is no folder"),
-            (["-o", __file__], "exists; give --overwrite"),
-        ):
+        for options, words in ((["-o", self.folder + "/no/c.html"], "there is no folder"), (["-o", __file__], "exists; give --overwrite")):
             self.assertIn(words, self.run_validate("--from", "r.csv", *options, status=1)[1])
 
     def test_without_the_solver_it_states_what_to_install(self):

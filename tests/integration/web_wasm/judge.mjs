@@ -2,8 +2,7 @@
 // usage: node judge.mjs judges.wasm gains CAPTURE.ftr [FORCE_N]
 //        node judge.mjs judges.wasm pulls CAPTURE.ftr KNOWN_N
 //        node judge.mjs judges.wasm doctor CAPTURE.ftr
-// Prints JSON. Packets before an info packet are left out. used: bytes of the capture that a session
-// took until it was done.
+// Prints JSON. Packets before an info packet are left out. used: bytes of the capture that a session took until it was done.
 import fs from 'node:fs';
 import { load } from '../../../host_tools/web/wasm/judges.mjs';
 

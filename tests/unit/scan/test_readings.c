@@ -284,9 +284,7 @@ TEST(test_a_temperature_step_needs_a_second_and_makes_a_suspect) {
   static const struct {
     double first_degC, second_degC;
     bool suspect;
-  } cases[] = {
-      {2, 2.1, true}, {-4, -4, true}, {2, -3, false}, {2, 4.5, false}, {-60, -60, true}, {20, 35, false},
-  };
+  } cases[] = {{2, 2.1, true}, {-4, -4, true}, {2, -3, false}, {2, 4.5, false}, {-60, -60, true}, {20, 35, false}};
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     next_case();
     const uint32_t rest = d2[ONE];

@@ -73,9 +73,8 @@ TEST(WindUp, BeginsLikeASpringAndEndsWhereAllSlides) {
 }
 
 TEST(WindUp, IsNearLubkinsIntegrals) {
-  // The stiffness of what sticks, a disc of radius c, (16 / 3) G c^3, over the turn that leaves it:
-  // 3 mu F / (4 pi G a^2) (K - E), elliptic integrals of k, k^2 = 1 - (c / a)^2. All in their
-  // units.
+  // The stiffness of what sticks, a disc of radius c, (16 / 3) G c^3, over the turn that leaves it: 3 mu F / (4 pi G
+  // a^2) (K - E), elliptic integrals of k, k^2 = 1 - (c / a)^2. All in their units.
   const double limit = 3.0 * M_PI / 16.0;
   constexpr int STEPS = 20000;
   double torque = 0.0;

@@ -1,5 +1,4 @@
-// The page's simulated pad: what its file of objects keeps of the twin's tables, and what hand,
-// weight and load do.
+// The page's simulated pad: what its file of objects keeps of the twin's tables, and what hand, weight and load do.
 #include "simulation/twin/held_object.hpp"
 #include "simulation/twin/traction_table.hpp"
 #include "web/tables/objects_of_twin.hpp"

@@ -2,8 +2,7 @@
 recognised whether or not the fingertip estimates a tangential force.
 
 A pull changes the shape of the readings over the sensors: they rise ahead of the contact and fall behind it. What they all lose together
-changes no shape. The difference of two shapes is the norm of what the better scale of one leaves of the other, over the
-other's norm.
+changes no shape. The difference of two shapes is the norm of what the better scale of one leaves of the other, over the other's norm.
 """
 
 import collections

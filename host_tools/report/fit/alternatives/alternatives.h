@@ -1,7 +1,6 @@
-/* The fits that one writes down first, to compare the firmware's with: least squares of
- * p0 exp(-((x - xc)^2 + (y - yc)^2) / (2 sigma^2)) with expf or exp for every sensor, the amplitude
- * as a fourth parameter and a 4 x 4 solve, each in float and in double. The same source runs on the
- * host for its errors and on the chip for its cycles.
+/* The fits that one writes down first, to compare the firmware's with: least squares of p0 exp(-((x - xc)^2 + (y -
+ * yc)^2) / (2 sigma^2)) with expf or exp for every sensor, the amplitude as a fourth parameter and a 4 x 4 solve, each
+ * in float and in double. The same source runs on the host for its errors and on the chip for its cycles.
  *
  *   naive  Gauss-Newton, full steps, no bounds
  *   lm     Levenberg-Marquardt: a step that raises the cost is taken back and damped tenfold, one
@@ -9,8 +8,7 @@
  *          rounding error or so.
  *
  * iterations: steps tried. Results are all zero with fewer than four usable sensors or no positive
- * reading, and may be anything, not a number included, where the iteration diverged.
- */
+ * reading, and may be anything, not a number included, where the iteration diverged. */
 #ifndef ALTERNATIVES_ALTERNATIVES_H
 #define ALTERNATIVES_ALTERNATIVES_H
 

@@ -1,6 +1,5 @@
 /* An image that fits the given readings, for counting cycles in the emulator: fit_on_chip.mjs
- * beside this file is its other half and is the debugger that the breakpoints call.
- */
+ * beside this file is its other half and is the debugger that the breakpoints call. */
 #include "alternatives/alternatives.h"
 #include "config/geometry.h"
 #include "fit/fit.h"

@@ -1,7 +1,5 @@
-/* An image that takes a frame of any number of sensors through the firmware's arithmetic, for
- * counting cycles in the emulator: sensor_cycles.mjs beside this file is its other half and plays
- * the debugger that the breakpoints call.
- */
+/* An image that takes a frame of any number of sensors through the firmware's arithmetic, for counting cycles in the
+ * emulator: sensor_cycles.mjs beside this file is its other half and plays the debugger that the breakpoints call. */
 #include "condition/condition.h"
 #include "fit/fit.h"
 #include "ms58xx/ms58xx.h"

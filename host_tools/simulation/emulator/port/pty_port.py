@@ -1,9 +1,8 @@
 #!/usr/bin/python3
 """Holds the pseudo-terminal of pty_port.mjs: usage pty_port.py LINK. The frames are described there.
 
-Ends when its stdin closes. Opening and closing by a client shows as the absence or presence of POLLHUP on the
-master side; the line is put into raw mode before the first client and after the last one, baud rate changes are
-polled while a client has it open.
+Ends when its stdin closes. Opening and closing by a client shows as the absence or presence of POLLHUP on the master side; the line is put
+into raw mode before the first client and after the last one, baud rate changes are polled while a client has it open.
 """
 
 import contextlib

@@ -81,8 +81,7 @@ std::function<bool()> patience(const Transport &transport, const Session &sessio
   };
 }
 
-/* A fingertip with a session on it. Reports on standard error if it waits long for an answer; the
- * signals end it. */
+/* A fingertip with a session on it. Reports on standard error if it waits long for an answer; the signals end it. */
 struct Device {
   std::unique_ptr<Transport> transport;
   Session session;
