@@ -29,6 +29,13 @@ constexpr double FORCE_SD_MOST = 1.0;
 // A tangential force with one of these flags is not trusted.
 constexpr std::uint32_t FORCE_ONLY = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND |
                                      CONTACT_FLAG_SATURATED | CONTACT_FLAG_ZERO_DOUBTFUL;
+// A place with one of these flags is not trusted. UNCERTAIN says that a pull may have moved it, which is what it is
+// for.
+constexpr std::uint32_t NO_PLACE = FORCE_ONLY & ~std::uint32_t{CONTACT_FLAG_UNCERTAIN};
+// A pull of the contact's own force moves its place by this many sigmas, and more, whatever its shape: points by 0.62,
+// lines up to 24 mm by 0.55, areas up to 18 mm by 0.5, of 24 mm by 0.48 (12 mm of rubber; near corners 0.35 to 0.55).
+constexpr double PULLED = 0.5;
+constexpr double PULLS_s = 0.025; // one frame alone shows no pull
 constexpr std::uint32_t OVER = CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND;
 // A contact with a larger sigma is a plate. Its Gaussian reaches far beyond the pad, so only the part
 // of its force that lies on the pad counts. A block of 36 by 54 mm is such a plate.
@@ -81,6 +88,15 @@ void GripFinger::take(const GripTouch &touch) {
     sum_y_N_ += touch.qy_N;
     sums_++;
   }
+  if (has_contact && (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (touch.flags & NO_PLACE) == 0) {
+    sum_x_mm_ += touch.x_mm;
+    sum_y_mm_ += touch.y_mm;
+    places_++;
+    const double moved_mm = has_zero_place_ ? std::hypot(touch.x_mm - zero_x_mm_, touch.y_mm - zero_y_mm_) : 0.0;
+    const double pulled = moved_mm / (PULLED * std::max(touch.sigma_mm, 1.0));
+    pulled_ = std::min(pulled, pulled_ + (pulled - pulled_) * std::min((touch.t_s - place_t_s_) / PULLS_s, 1.0));
+    place_t_s_ = touch.t_s;
+  }
 }
 
 bool GripFinger::has_load() const {
@@ -90,7 +106,9 @@ bool GripFinger::has_load() const {
 void GripFinger::begin_zero() {
   of_both_ = 1.0; // another object
   zero_x_N_ = zero_y_N_ = sum_x_N_ = sum_y_N_ = 0.0;
-  sums_ = 0;
+  sum_x_mm_ = sum_y_mm_ = 0.0;
+  sums_ = places_ = 0;
+  has_zero_place_ = false;
 }
 
 void GripFinger::end_zero() {
@@ -98,6 +116,11 @@ void GripFinger::end_zero() {
     zero_x_N_ = sum_x_N_ / sums_;
     zero_y_N_ = sum_y_N_ / sums_;
   }
+  if (places_ > 0) {
+    zero_x_mm_ = sum_x_mm_ / places_;
+    zero_y_mm_ = sum_y_mm_ / places_;
+  }
+  has_zero_place_ = places_ > 0;
 }
 
 bool GripFinger::has_zero() const { return !has_load() || sums_ >= ZERO_FRAMES; }
@@ -142,9 +165,13 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
     recoils = reading.load_N > SHARED_N &&
               touch_.speed_x_mm_s * reading.load_x_N + touch_.speed_y_mm_s * reading.load_y_N < 0.0;
   }
-  // Eq. (7) mistakes a tangential force for a slide, so it counts only if there is no other evidence.
+  reading.has_place = reading.contact && touch_.t_s < place_t_s_ + settings.stale_s;
+  reading.pulled = reading.has_place ? pulled_ : 0.0;
+  // Eq. (7) mistakes a tangential force for a slide, so it counts only if there is no other evidence, and no friction
+  // explains how far the contact has moved.
   const std::uint32_t slide = reading.has_load ? CONTACT_FLAG_SLIDING : CONTACT_FLAG_SLIP;
-  reading.slides = reading.contact && (touch_.flags & slide) != 0 && !recoils;
+  const bool is_held = reading.has_load ? recoils : reading.has_place && pulled_ <= settings.friction;
+  reading.slides = reading.contact && (touch_.flags & slide) != 0 && !is_held;
   return reading;
 }
 
@@ -241,7 +268,7 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   }
   GripReadings all;
   all.low_N = all.t_s = std::numeric_limits<double>::infinity();
-  double loads_N = 0.0, most_N = 0.0, normal_N = 0.0;
+  double loads_N = 0.0, most_N = 0.0, normal_N = 0.0, most_pull_N = 0.0, least_pull_N = all.low_N;
   int loads = 0;
   all.speed_mm_s = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < fingers.size(); i++) {
@@ -264,6 +291,11 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
       all.sd_N = std::max(all.sd_N, reading.sd_N);
       all.t_s = std::min(all.t_s, reading.t_s);
     }
+    all.has_place = all.has_place && (reading.has_place || !reading.contact);
+    if (reading.contact) {
+      least_pull_N = std::min(least_pull_N, reading.pulled * reading.force_N);
+      most_pull_N = std::max(most_pull_N, reading.pulled * reading.force_N);
+    }
     if (reading.has_load) {
       loads++;
       loads_N += reading.load_N;
@@ -282,6 +314,8 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   // An object in the air presses on both alike, so the mean is the better estimate. The further they
   // differ, the less is believed.
   all.grip_N = std::max(all.low_N, all.mean_N - std::max(all.high_N - all.low_N - settings.differ * all.high_N, 0.0));
+  // One fingertip alone is not believed to carry more than two thirds.
+  all.place_N = std::min(2.0 * least_pull_N, most_pull_N);
   all.has_load = loads > 0;
   if (loads > 0) {
     // Both share the load; if one carries far more, that one slides first.

@@ -37,6 +37,8 @@ struct GripReading {
   double t_s = 0.0;         // time of the measured force
   double load_x_N = 0.0, load_y_N = 0.0;
   double force_N = 0.0, sd_N = 0.0, load_N = 0.0, load_sd_N = 0.0, speed_mm_s = 0.0;
+  bool has_place = false;
+  double pulled = 0.0; // tangential over normal force, by how far the place has moved since end_zero; 0 before
 };
 
 class GripReach;
@@ -62,7 +64,7 @@ public:
   double keeps(const GripReading &reading) const;
   double pull_N(const GripReading &reading) const;
 
-  // Sets the zero of the tangential force to its mean between begin and end.
+  // Sets the zeros of tangential force and place to their means between begin and end.
   void begin_zero();
   void end_zero();
   bool has_zero() const; // enough frames for end_zero, or no tangential force at all
@@ -80,7 +82,10 @@ private:
   bool is_doubted_ = false, is_marked_ = false;
   int unchanged_ = 0; // frames whose values are those of the one before
   double zero_x_N_ = 0.0, zero_y_N_ = 0.0, sum_x_N_ = 0.0, sum_y_N_ = 0.0;
-  int sums_ = 0;
+  double place_t_s_ = -1.0, pulled_ = 0.0;
+  double zero_x_mm_ = 0.0, zero_y_mm_ = 0.0, sum_x_mm_ = 0.0, sum_y_mm_ = 0.0;
+  bool has_zero_place_ = false;
+  int sums_ = 0, places_ = 0;
 };
 
 // The combined reading of both fingertips; a reading that is not trusted is left out.
@@ -95,6 +100,8 @@ struct GripReadings {
   double load_N = 0.0; // tangential force at one fingertip, less its zero
   double load_sd_N = 0.0;
   double keeps = 0.0, pull_N = 0.0; // GripFinger::mark: the most and the least of the marked fingertips
+  bool has_place = true;            // of all that have contact
+  double place_N = 0.0;             // tangential force by GripReading::pulled
   double ratio = 0.0;               // tangential over normal force, of the fingertips that have both
   double speed_mm_s = 0.0;          // sliding speed at the slower fingertip
   std::array<double, GRIP_FINGERS> force_N{};

@@ -233,7 +233,7 @@ std::uint32_t Grip::squeeze() {
     return trouble;
   }
   if (!alone && (((there || capped) && !status_.moving) || over)) {
-    if (!fixed && !is_blind_ && !readings_.has_load) {
+    if (!fixed && !is_blind_ && !readings_.has_load && !readings_.has_place) {
       is_blind_ = true; // squeeze on to the grip that holds without a load
       since_s_ = now_s_;
     } else {

@@ -114,6 +114,7 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
     return;
   }
   friction_.rests();
+  place_.rests(readings.place_N, 0.0, passed_s, false);
   if (!readings.has_load) {
     return;
   }
@@ -142,7 +143,10 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
     update(readings, settings, now_s);
   }
   const double late_N = settings.sets_force() ? 0.0 : FLOOR_N_s * late_s(readings.delay_s);
-  const double least_N = !has_seen_load_ && !readings.has_load ? settings.unseen_N()
+  const double least_known_N = settings.mass_kg > 0.0 ? settings.first_N() : settings.floor_N + late_N;
+  const double by_place_N = std::max(settings.margin * place_.ahead_N(dead_s) / settings.friction, least_known_N);
+  const double blind_N = readings.has_place ? std::min(by_place_N, settings.unseen_N()) : settings.unseen_N();
+  const double least_N = !has_seen_load_ && !readings.has_load ? blind_N
                          : was_loaded_                         ? settings.floor_N + late_N
                                                                : settings.first_N();
   double need = std::max(need_N(settings, readings.delay_s, dead_s), least_N);
@@ -151,10 +155,12 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
   }
   need = std::min(need, settings.cap_N);
   is_set_ = settings.sets_force() && need == least_N && !is_loaded() && slides_ == 0;
-  if (readings.has_load && !goes_on_) {
-    // A force that was wanted and is not under way is given up: the load that it was for has not
-    // come. The present grip decays slowly.
+  // A force that was wanted and is not under way is given up: the load that it was for has not come.
+  if ((readings.has_load || readings.has_place) && !goes_on_) {
     wanted_N_ = std::min(wanted_N_, coming_N);
+  }
+  if (readings.has_load && !goes_on_) {
+    // The present grip decays slowly.
     const bool rests = !readings.slides && (slides_ == 0 || now_s - slid_s_ > settings.rest_s);
     const double share = rests ? 1.0 - std::exp(-settings.decay_1_s * passed_s) : 0.0;
     wanted_N_ -= share * std::max(wanted_N_ - need, 0.0);

@@ -66,7 +66,7 @@ private:
   double need_N(const GripSettings &settings, double delay_s, double dead_s) const;
 
   GripFriction friction_;
-  GripLoad load_;
+  GripLoad load_, place_; // the latter by how far the contact has moved
   double wanted_N_ = 0.0;
   double now_s_ = 0.0, updated_s_ = 0.0;
   double slid_s_ = 0.0; // time of the last frame of a slide

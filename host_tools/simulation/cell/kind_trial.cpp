@@ -8,6 +8,7 @@
 extern "C" {
 #include "common/contact_flags.h"
 #include "contact/motion.h"
+#include "contact/slip.h"
 }
 
 #include <algorithm>
@@ -25,6 +26,10 @@ constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 constexpr double CONVERSION_s = 2.3e-3, PROCESSING_s = 1.6e-3;
 constexpr double FORCE_NOISE = 0.004, FORCE_NOISE_N = 0.01, LOAD_NOISE_N = 0.015, PLACE_NOISE_mm = 0.012;
 constexpr double GATE_N = 0.05; // less is no contact
+// The twin's Gaussians on 12 mm of rubber: their sigma, and how far a pull of the contact's own force moves them.
+constexpr double POINT_mm = 6.0, LINE_mm = 7.2, AREA_mm = 9.0, PULLED = 0.55;
+constexpr std::uint32_t SLIP_WINDOW_us = 100000;
+constexpr float SLIP_mm = 0.75F;
 constexpr double STEPS_s = 0.01, PATIENCE_s = 12.0, SAMPLED_s = 2e-3;
 constexpr double NEAR = 0.1, SETTLED_s = 0.5; // of a set force
 constexpr double APART_mm = 1e3, FREE_mm = 0.5, TOUCHED_N = 0.05, LOST_N = 0.01;
@@ -41,8 +46,8 @@ class Tip {
 public:
   Tip(const KindTrial &trial, std::size_t finger)
       : pad_(trial.grasp.pads[finger]), mirror_(finger == 0 ? 1.0 : -1.0), load_share_(trial.load_share),
-        noise_(trial.noise), period_s_(1.0 / trial.rate_Hz), random_(trial.seed, TIP, finger),
-        next_s_(random_.uniform(0.0, period_s_)) {
+        sigma_mm_(sigma_of(trial.grasp.shape)), noise_(trial.noise), period_s_(1.0 / trial.rate_Hz),
+        random_(trial.seed, TIP, finger), next_s_(random_.uniform(0.0, period_s_)) {
     settings_.force_scale = settings_.tangential_scale = 1.0F;
   }
   double next_s() const { return next_s_; }
@@ -70,6 +75,7 @@ public:
     fit_tangential found{};
     contact_result result{};
     ::motion moved{};
+    const bool has_load = load_share_ > 0.0 && sigma_mm_ == POINT_mm;
     if (input.contact) {
       const double share = 1.0 / std::max(force_N, GATE_N);
       const auto noise = [&](double sd) { return noise_ * sd * random_.normal(); };
@@ -78,14 +84,21 @@ public:
       const double load_gain = load_share_ * pad_.gain;
       found.qx_N = static_cast<float>(mirror_ * (load_gain * load_N.x + pad_.ratio.x * sensed_N) + noise(LOAD_NOISE_N));
       found.qy_N = static_cast<float>(load_gain * load_N.y + pad_.ratio.y * sensed_N + noise(LOAD_NOISE_N));
-      found.x_mm = static_cast<float>(mirror_ * (way_mm.x + pad_.crosstalk * load_N.x * share) + noise(PLACE_NOISE_mm));
-      found.y_mm = static_cast<float>(way_mm.y + pad_.crosstalk * load_N.y * share + noise(PLACE_NOISE_mm));
+      const double moved_mm = share * (has_load ? pad_.crosstalk : PULLED * sigma_mm_);
+      found.x_mm = static_cast<float>(mirror_ * (way_mm.x + moved_mm * load_N.x) + noise(PLACE_NOISE_mm));
+      found.y_mm = static_cast<float>(way_mm.y + moved_mm * load_N.y + noise(PLACE_NOISE_mm));
       found.location_noise_mm = static_cast<float>(PLACE_NOISE_mm);
       found.location_sd_mm = 0.1F;
-      input.tangential = &found;
+      input.tangential = has_load ? &found : nullptr;
       result.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
                      CONTACT_FLAG_TARED | CONTACT_FLAG_CALIBRATED |
-                     (load_share_ > 0.0 ? std::uint32_t{CONTACT_FLAG_TANGENTIAL_VALID} : 0u);
+                     std::uint32_t{has_load ? CONTACT_FLAG_TANGENTIAL_VALID : CONTACT_FLAG_UNCERTAIN};
+      float slip_mm = 0.0F;
+      if (slip_update(&slips_, input.t_us, found.x_mm, found.y_mm, SLIP_WINDOW_us, &slip_mm) && slip_mm > SLIP_mm) {
+        result.flags |= CONTACT_FLAG_SLIP;
+      }
+    } else {
+      slip_reset(&slips_);
     }
     motion_update(&history_, &settings_, &input, &result, &moved);
     touch.flags = result.flags;
@@ -94,9 +107,9 @@ public:
       touch.force_sd_N = 0.05 * sensed_N;
       touch.x_mm = static_cast<double>(found.x_mm);
       touch.y_mm = static_cast<double>(found.y_mm);
-      touch.sigma_mm = 6.0;
-      touch.qx_N = static_cast<double>(found.qx_N);
-      touch.qy_N = static_cast<double>(found.qy_N);
+      touch.sigma_mm = sigma_mm_;
+      touch.qx_N = has_load ? static_cast<double>(found.qx_N) : 0.0;
+      touch.qy_N = has_load ? static_cast<double>(found.qy_N) : 0.0;
       touch.q_sd_N = 0.05 * sensed_N;
       touch.speed_x_mm_s = static_cast<double>(moved.vx_mm_s);
       touch.speed_y_mm_s = static_cast<double>(moved.vy_mm_s);
@@ -105,11 +118,17 @@ public:
   }
 
 private:
+  static double sigma_of(Shape shape) {
+    const bool area = shape == Shape::box || shape == Shape::plate;
+    return shape == Shape::ball || shape == Shape::egg ? POINT_mm : area ? AREA_mm : LINE_mm;
+  }
+
   KindOfPad pad_;
-  double mirror_, load_share_, noise_, period_s_;
+  double mirror_, load_share_, sigma_mm_, noise_, period_s_;
   Random random_;
   tangential_settings settings_{};
   motion_history history_{};
+  slip_history slips_{};
   double next_s_, known_s_ = 0.0;
 };
 

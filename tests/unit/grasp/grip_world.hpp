@@ -87,6 +87,8 @@ public:
   std::array<double, 2> gain{1.0, 1.0}, load_share{1.0, 1.0};
   double sd_share = 0.05; // of a force, as reported
   double sigma_mm = 6.0;
+  double pulled_mm = 0.0;           // the place for each unit of tangential over normal force
+  std::array<double, 2> moved_mm{}; // besides
   std::array<bool, 2> slides{}, mute{}, frozen{};
   std::array<std::uint32_t, 2> add_flags{}, drop_flags{};
   bool active = true, gripper_mute = false, activated = false;
@@ -122,6 +124,7 @@ private:
     touch.force_sd_N = sd_share * sensed_N;
     touch.sigma_mm = sigma_mm;
     touch.x_mm = frozen[finger] ? 0.0 : 1e-3 * (frames_ % 7);
+    touch.y_mm = pulled_mm * load_share[finger] * load_N / sensed_N + moved_mm[finger];
     touch.qy_N = (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 ? load_share[finger] * load_N : 0.0;
     touch.speed_y_mm_s = slide_mm_s;
     return touch;

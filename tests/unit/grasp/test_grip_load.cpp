@@ -203,11 +203,53 @@ TEST(Grip, NothingIsMissingWhereNoLoadIsTold) {
     GripWorld world({}, gripper_traits("2f85"));
     world.keeps_limit = true;
     world.stiffness = stiffness;
-    world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
+    world.add_flags = {CONTACT_FLAG_FLAT, CONTACT_FLAG_FLAT};
     world.grasp();
     world.run(0.1);
     EXPECT_GT(world.force_N, 0.97 * world.settings.blind_N) << stiffness;
     EXPECT_LT(world.peak_N, world.settings.cap_N) << stiffness;
     EXPECT_NE(world.report.trouble & GRIP_NO_LOAD, 0u) << stiffness;
+  }
+}
+
+// Without a tangential force the place shows the load: no less than it needs, no more than where it shows nothing.
+TEST(Grip, IsAsFirmAsThePlaceShows) {
+  for (const double load_N : {0.5, 2.0, 6.0}) {
+    GripWorld world;
+    world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
+    world.add_flags = {CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_UNCERTAIN};
+    world.pulled_mm = 0.55 * world.sigma_mm;
+    world.load_share[1] = 0.6;
+    world.grasp();
+    EXPECT_LT(world.peak_N, 1.2 * world.settings.start_N);
+    world.pull(load_N, 0.3);
+    world.run(1.0);
+    const double least_N = std::min(world.settings.margin * load_N / world.settings.friction, world.settings.blind_N);
+    EXPECT_GT(world.force_N, 0.97 * least_N) << load_N;
+    EXPECT_LT(world.peak_N, 1.05 * world.settings.blind_N) << load_N;
+    EXPECT_NE(world.report.trouble & GRIP_NO_LOAD, 0u);
+    const double before_N = world.peak_N;
+    world.moved_mm[0] = 8.0; // one frame
+    world.run(world.frame_s);
+    world.moved_mm[0] = 0.0;
+    world.run(0.5);
+    EXPECT_LT(world.peak_N, 1.2 * before_N) << load_N;
+    world.add_flags = {CONTACT_FLAG_FLAT, CONTACT_FLAG_FLAT};
+    world.run(1.0);
+    EXPECT_GT(world.force_N, 0.97 * world.settings.blind_N);
+  }
+}
+
+// What friction cannot hold is a slide, if eq. (7) reports one.
+TEST(Grip, APlaceBeyondFrictionSlides) {
+  for (const double ratio : {0.4, 0.7}) {
+    GripWorld world;
+    world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
+    world.grasp();
+    world.run(0.5);
+    world.add_flags = {CONTACT_FLAG_SLIP, CONTACT_FLAG_SLIP};
+    world.moved_mm = {0.5 * world.sigma_mm * ratio, 0.5 * world.sigma_mm * ratio};
+    world.run(0.3);
+    EXPECT_EQ(world.report.state, ratio > world.settings.friction ? GRIP_SLIPPING : GRIP_HOLDING) << ratio;
   }
 }

@@ -53,7 +53,7 @@ TEST(Grip, OneThatIsFrozenInTheAirNeverLeadsBeyondTheCap) {
 TEST(Grip, AnUncertainForceIsHeldFirmlyEnough) {
   GripWorld world({{"cap", 20}}); // below the gripper's own least limit
   world.sd_share = 0.45;
-  world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
+  world.add_flags = {CONTACT_FLAG_FLAT, CONTACT_FLAG_FLAT};
   world.grasp();
   world.run(1.0);
   EXPECT_GT(world.force_N, 0.9 * world.settings.blind_N);
