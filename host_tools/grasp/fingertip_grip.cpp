@@ -1,6 +1,6 @@
 #include "grasp/fingertip_grip.h"
 
-#include "grasp/convert.hpp"
+#include "grasp/fingertip.hpp"
 #include "grasp/settings.hpp"
 #include "grasp/words.hpp"
 #include "libfingertip/fingertip_values.hpp"

@@ -1,6 +1,6 @@
 #include "grasp/grasp_loop.hpp"
 
-#include "grasp/convert.hpp"
+#include "grasp/fingertip.hpp"
 #include "grasp/words.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"

@@ -1,6 +1,5 @@
 #include "grasp/gripper_thread.hpp"
 
-#include "grasp/convert.hpp"
 #include "libfingertip/session.hpp"
 
 #include <algorithm>

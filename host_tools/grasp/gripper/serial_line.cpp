@@ -18,16 +18,9 @@ namespace fs = std::filesystem;
 namespace {
 
 speed_t speed_of(unsigned baud) {
-  switch (baud) {
-  case 115200:
-    return B115200;
-  case 500000:
-    return B500000;
-  case 1000000:
-    return B1000000;
-  default:
-    throw std::logic_error("no such speed");
-  }
+  static constexpr std::pair<unsigned, speed_t> SPEEDS[] = {{115200, B115200}, {1000000, B1000000}};
+  const auto *found = find_in(SPEEDS, [&](const auto &one) { return one.first == baud; });
+  return found ? found->second : throw std::logic_error("no such speed");
 }
 
 std::string line_of(const fs::path &path) {

@@ -6,7 +6,7 @@
 #include "simulation/cell/kind_trial.hpp"
 
 #include <algorithm>
-#include <set>
+#include <map>
 
 namespace fingertip::grasp {
 
@@ -173,13 +173,10 @@ void expect(FaultTrial &one) {
 }
 
 // What fails is a line's and a drive's, not a stroke's.
-std::vector<std::string> one_of_each_driver() {
-  std::vector<std::string> models;
-  std::set<GripperDriver> seen;
+std::map<GripperDriver, std::string> one_of_each_driver() {
+  std::map<GripperDriver, std::string> models;
   for (const GripperTraits &traits : gripper_models()) {
-    if (seen.insert(traits.driver).second) {
-      models.push_back(traits.model);
-    }
+    models.emplace(traits.driver, traits.model);
   }
   return models;
 }
@@ -228,7 +225,7 @@ nlohmann::ordered_json row_of(const FaultTrial &one, double may_open_mm) {
 nlohmann::ordered_json fault_rows(std::uint64_t jobs) {
   std::vector<FaultTrial> all;
   std::uint64_t grasps = 0;
-  for (const std::string &gripper : one_of_each_driver()) {
+  for (const auto &[driver, gripper] : one_of_each_driver()) {
     for (const Thing &thing : THINGS) {
       for (const When &when : STATES) {
         grasps++;

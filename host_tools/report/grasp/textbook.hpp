@@ -2,7 +2,7 @@
 // slide, rubber of one stiffness, one move every 100 ms.
 #pragma once
 
-#include "simulation/cell/controller.hpp"
+#include "simulation/cell/kind_trial.hpp"
 
 #include <array>
 

@@ -5,7 +5,7 @@
 //
 // The controller takes what came in a slice at its end, so up to a slice late; all else is at its
 // own time.
-#include "grasp/convert.hpp"
+#include "grasp/fingertip.hpp"
 #include "grasp/gripper/gripper.hpp"
 #include "libfingertip/clock_fit.hpp"
 #include "libfingertip/command.hpp"
@@ -13,9 +13,8 @@
 #include "libfingertip/names.hpp"
 #include "library/pad/profile.hpp"
 #include "simulation/cell/cell.hpp"
-#include "simulation/cell/controller.hpp"
 #include "simulation/cell/gripper_line.hpp"
-#include "simulation/cell/slips.hpp"
+#include "simulation/cell/kind_trial.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"

@@ -8,7 +8,7 @@
 // every 10 ms. Deterministic but for step_us: the same grasp, seed and controller give the same bits.
 #pragma once
 
-#include "simulation/cell/controller.hpp"
+#include "grasp/control/grip.hpp"
 #include "simulation/cell/faults.hpp"
 #include "simulation/cell/gripper_motion.hpp"
 #include "simulation/cell/kinds.hpp"
@@ -20,6 +20,31 @@
 #include <vector>
 
 namespace fingertip::cell {
+
+// What decides in a trial.
+class Controller {
+public:
+  virtual ~Controller() = default;
+  virtual void take_touch(std::size_t finger, const GripTouch &touch) = 0;
+  virtual void take_status(const GripperStatus &status) = 0;
+  virtual GripReport step(double now_s, GripCommand &command) = 0;
+  virtual void ask(GripRequest) {}
+};
+
+// The controller of grasp/control, grasping from the first step on.
+class CoreController : public Controller {
+public:
+  CoreController(const GripSettings &settings, const GripperTraits &traits) : core_(settings, traits) {
+    core_.request(GRIP_REQUEST_GRASP);
+  }
+  void take_touch(std::size_t finger, const GripTouch &touch) override { core_.take(finger, touch); }
+  void take_status(const GripperStatus &status) override { core_.take(status); }
+  GripReport step(double now_s, GripCommand &command) override { return core_.step(now_s, command); }
+  void ask(GripRequest request) override { core_.request(request); }
+
+private:
+  Grip core_;
+};
 
 struct KindTrial {
   KindOfGrasp grasp;

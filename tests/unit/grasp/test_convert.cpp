@@ -1,4 +1,4 @@
-#include "grasp/convert.hpp"
+#include "grasp/fingertip.hpp"
 #include "support/host_packets.hpp"
 
 #include <cmath>

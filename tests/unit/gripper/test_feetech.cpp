@@ -64,6 +64,7 @@ TEST(Feetech, MovesItsJawOnceActivated) {
   std::unique_ptr<Gripper> gripper = opened(MODEL, simulated.port());
   const GripperTraits &traits = gripper->traits();
   EXPECT_NEAR(traits.step_mm, 0.153, 0.001);
+  EXPECT_NE(gripper->line().find("servo model 777"), std::string::npos);
   EXPECT_FALSE(gripper->move({.width_mm = 10, .speed_mm_s = 100}).active);
   EXPECT_NEAR(gripper->poll().width_mm, traits.stroke_mm, 0.1);
 
@@ -121,7 +122,6 @@ std::string text(const Packet &packet) {
 
 const Packet ASK_TABLE = {6, feetech::READ, {feetech::MODEL, 31}};
 const Packet ASK_STATUS = {6, feetech::READ, {feetech::TORQUE_ENABLE, 31}};
-const Packet ASK_MODEL = {6, feetech::READ, {feetech::MODEL, 2}};
 
 Packet table() {
   Bytes bytes(31);
@@ -138,34 +138,6 @@ Packet status(int position) {
 }
 
 } // namespace
-
-/* Some adapters hear what they send: it comes back before the answer. */
-TEST(FeetechFrames, TheirOwnEchoIsIgnored) {
-  const auto exchange = [](const Packet &question, const Packet &answer) {
-    return std::pair(text(question), text(question) + " " + text(answer));
-  };
-  Tape tape({exchange(ASK_TABLE, table()), exchange(ASK_STATUS, status(2304)), exchange(ASK_STATUS, status(2304))});
-  {
-    std::unique_ptr<Gripper> gripper = opened(MODEL, tape.port());
-    EXPECT_NEAR(gripper->poll().width_mm, 200 * std::sin(std::numbers::pi / 16), 1e-9);
-    EXPECT_NE(gripper->line().find("servo model 777"), std::string::npos);
-  }
-  EXPECT_EQ(tape.complaint(), "");
-}
-
-TEST(FeetechFrames, NoLateAnswerIsTakenForThatToTheNextQuestion) {
-  Tape tape({{text(ASK_TABLE), text(table())},
-             {text(ASK_STATUS), text(status(2304))},
-             {text(ASK_STATUS), ""},
-             {text(ASK_MODEL), text(status(2304)) + " " + text({6, 0, {0x09, 0x03}})},
-             {text(ASK_STATUS), text(status(2176))}});
-  {
-    std::unique_ptr<Gripper> gripper = opened(MODEL, tape.port());
-    EXPECT_EQ(code_of([&] { gripper->poll(); }), ErrorCode::gripper_silent);
-    EXPECT_NEAR(gripper->poll().width_mm, 200 * std::sin(std::numbers::pi / 32), 1e-9);
-  }
-  EXPECT_EQ(tape.complaint(), "");
-}
 
 TEST(FeetechFrames, APositionOutsideOfATurnIsRefused) {
   for (const int position : {6396, 0x8005}) {

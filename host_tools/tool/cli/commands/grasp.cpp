@@ -1,5 +1,5 @@
 /* A grasp from a terminal: two fingertips and a gripper, shown, recorded and controlled. */
-#include "grasp/check.hpp"
+#include "grasp/fingertip.hpp"
 #include "grasp/grasp_loop.hpp"
 #include "grasp/grip_row.hpp"
 #include "grasp/gripper/gripper.hpp"
