@@ -26,8 +26,8 @@ constexpr int FIRST_EXCHANGES = 32;
 constexpr milliseconds EXCHANGE_INTERVAL{100};
 /* How far behind a loop may be with reading, for the others' rows to wait for it. */
 constexpr std::int64_t LONGEST_BACKLOG_us = 2000000;
-/* A second and a half at the highest rate, 2000 frames of two packets. */
-constexpr std::size_t FEED_CAPACITY = 6000;
+/* Of each fingertip: three seconds of 1308 frames of two packets, so that a disk may stall for two. */
+constexpr std::size_t FEED_CAPACITY = 8000;
 constexpr Session::Policy LAST_WORD = {milliseconds(500), 2};
 
 } // namespace
@@ -41,18 +41,20 @@ std::vector<DeviceNews> DeviceFeed::take(milliseconds timeout) {
   }
   std::vector<DeviceNews> taken(std::make_move_iterator(news_.begin()), std::make_move_iterator(news_.end()));
   news_.clear();
+  waiting_.clear();
   drained_.set();
   return taken;
 }
 
 void DeviceFeed::put(DeviceNews news, const std::atomic<bool> &abandoned) {
   std::unique_lock<std::mutex> lock(mutex_);
-  while (news_.size() >= FEED_CAPACITY && !abandoned) {
+  while (waiting_[news.device] >= FEED_CAPACITY && !abandoned) {
     lock.unlock();
     drained_.wait(host_now() + POLL); /* another loop may take what was meant for this one */
     lock.lock();
   }
   if (!abandoned) {
+    waiting_[news.device]++;
     news_.push_back(std::move(news));
     filled_.set();
   }

@@ -26,6 +26,7 @@
 #include <cstdint>
 #include <deque>
 #include <exception>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -61,9 +62,8 @@ struct DeviceNews {
   unsigned jumps = 0;       /* clock */
 };
 
-/* From the loops' threads to the one that takes. Holds some seconds of news at the highest rate.
- * When it is full the loops stop reading, and the fingertips drop and count what they cannot send.
- */
+/* From the loops' threads to the one that takes. Holds three seconds of each fingertip's news at 1308 frames/s.
+ * A loop whose share is full stops reading, and its fingertip drops and counts what it cannot send. */
 class DeviceFeed {
 public:
   /* All there is, waiting at most this long for the first. */
@@ -78,6 +78,7 @@ private:
   std::mutex mutex_;
   Wake filled_, drained_;
   std::deque<DeviceNews> news_;
+  std::map<std::size_t, std::size_t> waiting_; /* of them, by fingertip */
 };
 
 class DeviceLoop {

@@ -10,6 +10,7 @@
 #include "libfingertip/descriptor_transport.hpp"
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace fingertip {
@@ -42,11 +43,17 @@ std::string share_port_name(const std::string &serial);
 /* Beside them: where `fingertip grasp` takes requests, by its left fingertip's serial number. */
 std::string grasp_socket_name(const std::string &serial);
 
+/* What a server sends to one program too many, before it closes the connection; a frame that is none. */
+inline constexpr std::string_view SHARE_IS_FULL{"\0is full\0", 9};
+
 class SocketTransport : public DescriptorTransport {
 public:
   /* Throws Error: not shared, not allowed. */
   explicit SocketTransport(const std::string &path);
   bool reopen() override;
+  /* Throws Error also where the server is full. */
+  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
+              std::chrono::milliseconds timeout) override;
   /* The server serves a fingertip that does not speak this version of the protocol. */
   bool ask_loader() override;
 

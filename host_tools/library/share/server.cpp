@@ -256,6 +256,7 @@ private:
       std::string peer = peer_of(fd.get());
       if (connections_.size() == MOST_CLIENTS) {
         log(name() + ": " + peer + " is one too many, after " + std::to_string(MOST_CLIENTS));
+        (void)send(fd.get(), SHARE_IS_FULL.data(), SHARE_IS_FULL.size(), MSG_NOSIGNAL);
         continue;
       }
       connections_.push_back({std::move(fd), hub_->join(), std::move(peer)});
@@ -431,9 +432,18 @@ void Server::step(milliseconds longest_wait) {
   }
   milliseconds wait = more ? milliseconds(0) : std::min(longest_wait, any_gone ? REOPEN_INTERVAL : TICK);
   wait_for(waiting.data(), waiting.size(), host_now() + wait);
-  for (const auto &station : stations_) {
-    station->step(waiting);
+  for (auto &station : stations_) {
+    try {
+      station->step(waiting);
+    } catch (const Error &error) { /* such as another fingertip of the same serial number */
+      if (stations_.size() == 1) {
+        throw;
+      }
+      log_(error.what());
+      station.reset();
+    }
   }
+  stations_.erase(std::remove(stations_.begin(), stations_.end(), nullptr), stations_.end());
 }
 
 } // namespace fingertip

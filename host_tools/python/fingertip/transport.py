@@ -95,6 +95,9 @@ class SerialTransport:
             self._port.close()
 
 
+SHARE_IS_FULL = b"\0is full\0"  # from `fingertip serve` to one program too many (share_socket.hpp)
+
+
 class SocketTransport:
     """A Unix socket of `fingertip serve`; other programs have theirs at the same time."""
 
@@ -118,9 +121,12 @@ class SocketTransport:
 
     def read(self, wait_s: float, settle_s: float) -> bytes:
         try:
-            return _read_descriptor(self._socket.fileno(), wait_s, settle_s)
+            data = _read_descriptor(self._socket.fileno(), wait_s, settle_s)
         except OSError:
             raise GoneError(f"{self.description}: {self._GONE}") from None
+        if data == SHARE_IS_FULL:
+            raise PortInUseError(f"{self.description}: as many programs use this fingertip as can share it")
+        return data
 
     def write(self, data: bytes) -> None:
         try:

@@ -218,7 +218,7 @@ class Clients(ServeTest):
             for _ in range(59):
                 client = many.enter_context(socket.socket(socket.AF_UNIX))
                 client.connect(self.socket_of())
-            self.assertIn("vanished", self.error("info"))
+            self.assertIn("as many programs use this fingertip as can share it; end that one first", self.error("info"))
             self.assertIn(", simulated_finge is one too many, after 60", self.said())
             many.close()
             self.run_cli("info")
@@ -242,6 +242,11 @@ class Server(ServeTest):
         with self.device(), self.served():
             why = "another program shares this fingertip; use it as if it were your own, or end that one first"
             self.assertEqual(self.error("serve"), f"fingertip: {self.socket_of()}: {why}\n")
+            self.run_cli("info")
+
+    def test_one_that_cannot_be_shared_keeps_none_of_the_others(self):
+        with self.device(), self.served("--device", SERIAL, "--device", "99"):
+            self.assertIn("99", self.said())
             self.run_cli("info")
 
     def test_what_a_killed_one_leaves_is_replaced(self):

@@ -7,10 +7,13 @@
 
 #include <chrono>
 #include <cstdio>
+#include <exception>
 #include <grp.h>
 #include <map>
 #include <memory>
 #include <optional>
+#include <utility>
+#include <vector>
 
 namespace fingertip {
 
@@ -35,50 +38,72 @@ gid_t group_of(const std::string &name) {
   return found->gr_gid;
 }
 
-/* Serves fingertips that are plugged in later; an error that prevents this is printed once: errors has it by serial
- * number. */
-void look(Server &server, Reach reach, std::map<std::string, std::string> &errors) {
-  for (const Found &found : find_usb()) {
-    auto way = way_to(found, reach);
-    if (!way || server.has(*way)) {
-      continue;
-    }
-    try {
+/* By what they prevent from being served; last: of the last look. */
+struct Errors {
+  std::map<std::string, std::string> texts;
+  std::exception_ptr last;
+};
+
+/* Serves a fingertip unless it is served; one that cannot be keeps none of the others. */
+template <typename WayOf> void serve_if_there(Server &server, Errors &errors, const std::string &name, WayOf way_of) {
+  try {
+    const std::optional<Way> way = way_of();
+    if (way && !server.has(*way)) {
       server.add(*way);
-      errors.erase(found.serial);
-    } catch (const Error &error) {
-      if (errors[found.serial] != error.what()) {
-        errors[found.serial] = error.what();
-        print_line(error_text(error));
-      }
     }
+    errors.texts.erase(name);
+  } catch (const Error &error) {
+    errors.last = std::current_exception();
+    if (!server.is_empty() && std::exchange(errors.texts[name], error.what()) != error.what()) {
+      print_line(error_text(error));
+    }
+  }
+}
+
+/* Those that are there now, also plugged in later: all, or those that are named. Throws Error: none of them can be. */
+void look(Server &server, const ServeOptions &options, Errors &errors) {
+  std::map<std::string, int> serials;
+  for (const Found &found :
+       options.devices.empty() && options.choice.port.empty() ? find_usb() : std::vector<Found>()) {
+    serve_if_there(server, errors, found.serial + "/" + std::to_string(serials[found.serial]), [&] {
+      if (serials[found.serial]++) {
+        throw Error(found.serial + ": another fingertip has this serial number, and one of them is shared");
+      }
+      return way_to(found, options.choice.reach);
+    });
+  }
+  for (const std::string &each : options.devices) {
+    serve_if_there(server, errors, each, [&] {
+      return std::optional(choose_way({options.choice.port, each, options.choice.reach}));
+    });
   }
 }
 
 int serve(const ServeOptions &options) {
   Server server({options.common ? COMMON_SHARE_FOLDER : own_share_folder(), options.group}, print_line);
-  bool all = options.devices.empty() && options.choice.port.empty();
-  std::map<std::string, std::string> errors;
-  if (all) {
+  const bool is_one_port = options.devices.empty() && !options.choice.port.empty();
+  Errors errors;
+  if (is_one_port) {
+    server.add(choose_way(options.choice));
+  } else if (options.devices.empty()) {
     for (const Way &way : all_ways(options.choice.reach)) {
-      server.add(way);
+      serve_if_there(server, errors, way.port, [&] { return std::optional(way); });
     }
   }
-  for (const std::string &device : options.devices) {
-    server.add(choose_way({options.choice.port, device, options.choice.reach}));
+  look(server, options, errors);
+  if (server.is_empty() && errors.last) {
+    std::rethrow_exception(errors.last);
   }
-  if (!all && options.devices.empty()) {
-    server.add(choose_way(options.choice));
-  }
+  look(server, options, errors); /* reports those that are not served */
   if (server.is_empty()) {
     print_line("no fingertip here yet; each that is plugged in will be shared");
   }
   HostTime searched = host_now();
   while (!stop_requested()) {
     server.step(DEVICE_LOOK_INTERVAL);
-    if (all && host_now() - searched > DEVICE_LOOK_INTERVAL) {
+    if (!is_one_port && host_now() - searched > DEVICE_LOOK_INTERVAL) {
       searched = host_now();
-      look(server, options.choice.reach, errors);
+      look(server, options, errors);
     }
   }
   return 0;
