@@ -142,8 +142,8 @@ GripRow grip_row(std::string_view value) {
   return row;
 }
 
-GripRowReader::GripRowReader(const std::string &path, bool salvage)
-    : path_(path), salvage_(salvage), lines_(open_lines(path)) {}
+GripRowReader::GripRowReader(const std::string &path, bool salvage, const TimeSpan &interval)
+    : path_(path), salvage_(salvage), lines_(within(open_lines(path), interval)) {}
 
 std::optional<GripRow> GripRowReader::next() {
   static const std::string beginning = std::string("# ") + GRIP_ROW_KEY + ": ";

@@ -48,7 +48,7 @@ GripRow grip_row(std::string_view value);
 class GripRowReader {
 public:
   // salvage: damaged rows are skipped, else next throws Error with file and line.
-  GripRowReader(const std::string &path, bool salvage);
+  GripRowReader(const std::string &path, bool salvage, const TimeSpan &interval = {});
 
   std::optional<GripRow> next();
 

@@ -53,9 +53,10 @@ json packet_json(const wire_packet &packet) {
   return {{"other", told}};
 }
 
-json recording_json(const std::string &path, bool salvage, const std::string &device) {
+json recording_json(const std::string &path, bool salvage, const std::string &device, const json &part) {
   json rows = json::array(), packets = json::array(), events = json::array(), info;
-  RecordingReader reader(path, salvage, device);
+  const TimeSpan interval = part.is_null() ? TimeSpan() : TimeSpan{part[0], part[1]};
+  RecordingReader reader(path, salvage, device, interval);
   while (auto item = reader.next()) {
     if (item->kind == RecordingReader::Item::Kind::event) {
       events.push_back(item->event);
@@ -71,6 +72,9 @@ json recording_json(const std::string &path, bool salvage, const std::string &de
     } else {
       rows.push_back(item->time_us ? json{{"time_us", fixed(*item->time_us, 1)}, {"row", told}} : told);
     }
+  }
+  if (!part.is_null()) {
+    return {{"rows", rows}, {"has_end", reader.has_end()}, {"skipped", reader.skipped_lines()}};
   }
   return {{"rows", rows}, {"packets", packets},          {"events", events},
           {"info", info}, {"has_end", reader.has_end()}, {"skipped", reader.skipped_lines()}};
@@ -142,7 +146,7 @@ json refusal_of_all(const std::string &path) {
 json answer_to(const json &job) {
   const std::string kind = job["kind"], input = job["input"], device = job["device"];
   json answer = answered([&] {
-    return kind == "recording" ? recording_json(input, job["salvage"], device)
+    return kind == "recording" ? recording_json(input, job["salvage"], device, job.value("part", json()))
            : kind == "stream"  ? stream_json(input)
                                : setting_json(input);
   });

@@ -164,7 +164,7 @@ function setting(job: Job): Answer {
 await core.loadCore(readFileSync(process.env['FINGERTIP_CORE'] ?? ''));
 
 /** What the page has no way to ask; and a packet that names no fingertip, which is the first one's for a reader of all. */
-const LEFT_OUT = /^fuzz|^two_comment_packet_of_all/;
+const LEFT_OUT = /^fuzz|^part|^two_comment_packet_of_all/;
 const jobs = (JSON.parse(readFileSync(process.argv[2]!, 'utf8')) as Job[]).filter(
   (job) => !job.salvage && !LEFT_OUT.test(job.name) && (job.device !== '' || !job.name.startsWith('two')) && job.device !== 'CCCC',
 );

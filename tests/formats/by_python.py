@@ -91,8 +91,9 @@ def numbers(fields):
     return {name: str(value) if name == "host_time_us" else value for name, value in fields.items()}
 
 
-def recording(path, salvage, device):
-    found = read_recording(path, salvage=salvage, serial=device or None)
+def recording(path, salvage, device, part=None):
+    from_s, to_s, _ = part or (0, math.inf, 0)
+    found = read_recording(path, salvage=salvage, serial=device or None, from_s=from_s, to_s=to_s)
     rows = []
     for i in range(len(found["t_us"])):
 
@@ -107,6 +108,8 @@ def recording(path, salvage, device):
         rows += parts if found.time_us is None else [{"time_us": f"{found.time_us[i]:.1f}", "row": part} for part in parts]
     fields = {"health": wire.Health._fields, "ack": wire.Acknowledgement._fields, "sync": wire.SyncEdge._fields, "info": ()}
     packets = [{kind: numbers({name: int(values[name]) for name in ("sequence", "t_us", *fields[kind])})} for kind, values in found.packets]
+    if part:
+        return {"rows": rows, "has_end": bool(found.end), "skipped": found.skipped_lines}
     has_info = any("info" in packet for packet in packets)
     return {
         "rows": rows,
@@ -179,7 +182,7 @@ def setting(text):
 def answer_to(job):
     try:
         if job["kind"] == "recording":
-            return recording(job["input"], job["salvage"], job["device"])
+            return recording(job["input"], job["salvage"], job["device"], job.get("part"))
         return stream(job["input"]) if job["kind"] == "stream" else setting(job["input"])
     except InputError as error:
         text = str(error)

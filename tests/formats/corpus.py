@@ -1,7 +1,7 @@
 """The inputs of the test: recordings, CSV and MCAP, of one fingertip and of two; bytes of lines; settings as people type them. Good ones, the
 same damaged in ways that have a name, and by chance. All follow from here, from tests/vectors/wire and from tests/fuzz/corpus.
 
-A job is {"name", "kind": "recording" | "stream" | "setting", "input": path or text, "salvage", "device"}, and of some recordings "rows_of", "is_whole".
+A job is {"name", "kind": "recording" | "stream" | "setting", "input": path or text, "salvage", "device"}, and of some recordings "rows_of", "is_whole", "part".
 """
 
 import bz2
@@ -39,8 +39,8 @@ class Corpus:
         self.folder = pathlib.Path(folder)
         self.jobs = []
 
-    def recording(self, name, content, end="csv", devices=("",), rows_of="", is_whole=True):
-        """rows_of: the name of a recording with the same rows; all of them if it is_whole."""
+    def recording(self, name, content, end="csv", devices=("",), rows_of="", is_whole=True, part=None):
+        """rows_of: the name of a recording with the same rows; all of them if it is_whole. part: begin and end in seconds, and rows."""
         path = self.folder / f"{name}.{end}"
         path.write_bytes(content)
         for device in devices:
@@ -48,7 +48,7 @@ class Corpus:
                 words = [name, end, *filter(None, [device]), *["salvage"] * salvage]
                 job = {"name": " ".join(words), "kind": "recording", "input": str(path), "salvage": salvage, "device": device}
                 same = {"rows_of": " ".join([rows_of, *words[1:]]), "is_whole": is_whole} if rows_of else {}
-                self.jobs.append(job | same)
+                self.jobs.append(job | same | ({"part": part} if part else {}))
         return path
 
     def stream(self, name, content):
@@ -366,6 +366,29 @@ def cases_by_others(corpus, name, bag, devices):
         corpus.recording(f"{name}_packed_as_a_whole_by_{pack.__module__.split('.')[0]}", pack(bag.read_bytes()), "mcap", devices)
 
 
+def part_cases(corpus, text, convert):
+    """A second and a half of five: before a restart, and behind it, where times go on by the event's."""
+    lines = lines_of(text)
+    header, row = header_at(lines), full_row_at(lines)
+    rows = [lines[row].replace(lines[row].split(",")[0], str(10**6 + 20_000 * (i % 150)), 1) for i in range(250)]
+    rows = [line for i, each in enumerate(rows) for line in (*[f"# event: note {i}"] * (i % 50 == 0), each)]
+    rows.insert(rows.index("# event: note 150"), "# event: back 2024-05-06T07:08:13.500Z")
+    start, bag, by_package = (corpus.folder / f"start_part.{end}" for end in ("csv", "mcap", "package.mcap"))
+    start.write_bytes(text_of([*lines[: header + 1], *rows, lines[-1]]))
+    convert(start, bag)
+    bags.of_python(start, by_package)
+    data = bytearray(bag.read_bytes())
+    with open(bag, "rb") as file:
+        chunk = make_reader(file).get_summary().chunk_indexes[-1]
+    data[chunk.chunk_start_offset + chunk.chunk_length - 9] ^= 1  # in the last second: read by the index, it is not met
+    for name, part in (("before", [0.995, 2.495, 150]), ("behind", [4.495, 9, 200])):
+        corpus.recording(f"part_{name}", start.read_bytes(), part=part)
+        for which, content in (("tool", bag.read_bytes()), ("package", by_package.read_bytes())):
+            corpus.recording(f"part_{name}_{which}", content, "mcap", part=part)
+        corpus.recording(f"part_{name}_by_topic", rewritten(corpus, bag, lambda found: found[::-1]), "mcap", part=part)
+    corpus.recording("part_damaged_behind", bytes(data), "mcap", part=[0.995, 2.495, 150])
+
+
 def messages_of(path):
     """[(schema's name, message)] of lines and contacts."""
     with open(path, "rb") as file:
@@ -653,6 +676,7 @@ def make(folder, convert):
             bag_cases(corpus, "one_packed_by_lz4", by_lz4, devices, CHANCES)
         if name == "one":
             inner_cases(corpus, messages_of(by_tool), devices)
+    part_cases(corpus, one, convert)
     lines, bag = lines_of(two), corpus.folder / "start_many.mcap"
     rows = [line.replace("000.5", f"{time:03}.5", 1) for time in (*range(40), *range(30, 70)) for line in lines if line[0].isdigit()]
     start.write_bytes(text_of([*lines[: header_at(lines) + 1], *rows, lines[-1]]))

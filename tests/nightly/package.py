@@ -6,12 +6,12 @@ import subprocess
 import sys
 import time
 
-from nightly import PATIENCE_s, Programs, job, run
+from nightly import PATIENCE_s, REPORT, Programs, job, run
 
 from fingertip import Fingertip
 from fingertip.files import InputError, read_recording
 
-RATE_Hz, SECONDS = 1310, 60
+RATE_Hz, SECONDS, MANY_s = 1310, 60, 10
 
 
 def read_here(port, seconds):
@@ -54,9 +54,16 @@ def python(build):
     return {"python_seconds": SECONDS} | {f"python_{name}": round(value, 2) for name, value in found.items()}
 
 
-@job("tools", ("python_mcap_over_csv", "<=", 1.5))
+@job(
+    "tools",
+    ("python_mcap_us_per_row_over_csv", "<=", 1.5),
+    ("hour_mcap_GB", "<=", 0.8),
+    ("recordings_refused_wrongly", "<=", 0),
+    ("rows_lost_silently", "<=", 0),
+)
 def recordings(build):
-    """Processor time of read_recording for a row of a minute at the highest rate, the better of three readings of each kind."""
+    """Processor time of read_recording for a row of a minute at the highest rate, the better of three readings of each kind; the size of an hour;
+    and what the test formats counted."""
     with Programs(build) as programs:
         files, found = [programs.folder / f"minute.{end}" for end in ("csv", "mcap")], {}
         port = programs.fake_device("AAAA", f"rate={RATE_Hz}")
@@ -69,7 +76,25 @@ def recordings(build):
                 rows = len(read_recording(file)["t_us"])
                 times_s.append(time.process_time() - begun_s)
             found[f"python_{file.suffix[1:]}_us_per_row"] = round(min(times_s) / rows * 1e6, 2)
-    return found | {"python_mcap_over_csv": round(found["python_mcap_us_per_row"] / found["python_csv_us_per_row"], 2)}
+        found["hour_mcap_GB"] = round(files[1].stat().st_size * 3600 / SECONDS / 1e9, 2)
+    formats = json.loads((REPORT / "formats.json").read_text(encoding="utf-8")) if (REPORT / "formats.json").exists() else {}
+    found |= {name: formats.get(name) for name in ("recordings_refused_wrongly", "rows_lost_silently")}
+    return found | {"python_mcap_us_per_row_over_csv": round(found["python_mcap_us_per_row"] / found["python_csv_us_per_row"], 2)}
+
+
+@job("tools", ("record1_lost", "<=", 0), ("record8_lost", "<=", 0), ("record16_lost", "<=", 0))
+def many(build):
+    """Packets that `record --all` to MCAP counts as lost, of one, eight and sixteen fingertips at the highest rate."""
+    found = {}
+    for count in (1, 8, 16):
+        with Programs(build) as programs:
+            ports = [programs.fake_device(f"{i:04X}", f"rate={RATE_Hz}") for i in range(count)]
+            file = programs.folder / "many.mcap"
+            environment = programs.environment | {"FINGERTIP_PORT": ":".join(map(str, ports))}
+            run(build / "host_tools/tool/cli/fingertip", "record", file, "--all", "--seconds", MANY_s, env=environment)
+            ends = [read_recording(file, serial=f"{i:04X}" if count > 1 else None, columns=("t_us", "frame")).end for i in range(count)]
+            found[f"record{count}_lost"] = sum(int(end["dropped_packets"]) for end in ends)
+    return found
 
 
 if __name__ == "__main__":

@@ -230,7 +230,7 @@ def differences(csv_path, bag):
         by_topic[topic.rsplit("/", 1)[-1]].append((time_ns, without_header(message)))
     contacts = {message["line"]: message for _, message in by_topic["contact"]}
     differ += sum(contacts.get(number) != message for number, message in expected.items()) + len(contacts.keys() - expected.keys())
-    others = {message["line"]: message["text"] for _, message in by_topic["lines"]}
+    others = {message["line"]: message["text"] for _, message in (*by_topic["lines"], *by_topic["periodic"])}
     differ += sum(lines[number - 1] != text for number, text in others.items()) + (len(others) + len(contacts) != len(lines))
     for topic, parts in (("wrench", (0, 1)), ("place", (2,))):
         told = collections.Counter()
@@ -289,7 +289,7 @@ def truncations(tool, bag, csv_path, folder, count, seed):
     unread = 0
     for _ in range(count):
         cut.write_bytes(whole[: prng.randrange(len(whole))])
-        there = sum(topic.rsplit("/", 1)[-1] in ("lines", "contact") for topic, *_ in by_mcap_stream(cut))
+        there = sum(topic.rsplit("/", 1)[-1] in ("lines", "periodic", "contact") for topic, *_ in by_mcap_stream(cut))
         done = subprocess.run([tool, "convert", cut, out, "--salvage", "--overwrite"], capture_output=True, text=True, timeout=PATIENCE_s)
         read = out.read_bytes().split(b"\n")[:-1] if done.returncode == 0 else []
         try:

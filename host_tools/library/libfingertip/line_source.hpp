@@ -2,9 +2,11 @@
 #pragma once
 
 #include <any>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <ios>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -25,9 +27,11 @@ public:
 class LineSource {
 public:
   struct Line {
-    std::uint64_t number; /* from 1; where lines are lost, the next one's */
-    std::string text;     /* without its end */
-    bool torn;            /* the file ends within it */
+    std::uint64_t number;                                     /* from 1; where lines are lost, the next one's */
+    std::string text;                                         /* without its end */
+    bool torn;                                                /* the file ends within it */
+    std::uint64_t left_out = 0;                               /* lines before it, which were not wanted */
+    double time_s = std::numeric_limits<double>::quiet_NaN(); /* by the log time, since the recording began */
   };
   struct Place {
     std::streamoff offset = 0;
@@ -44,6 +48,8 @@ public:
   /* The position of reading, to go back to. */
   virtual Place place() = 0;
   virtual void go_to(const Place &place) = 0;
+  /* What lies outside of these seconds since the recording began may be left out, notes and settings apart. */
+  virtual void want(double from_s, double to_s) { (void)from_s, (void)to_s; }
 };
 
 /* Whether they begin as an MCAP file does. */
@@ -58,6 +64,14 @@ std::unique_ptr<LineSource> lines_of(const std::string &path, std::unique_ptr<By
 /* Of files. Throw Error if it cannot be read. */
 std::unique_ptr<ByteSource> open_bytes(const std::string &path);
 std::unique_ptr<LineSource> open_lines(const std::string &path);
+
+/* Seconds since a recording began, as the log times of an MCAP file count them (RECORDING.md). */
+struct TimeSpan {
+  double from_s = 0, to_s = std::numeric_limits<double>::infinity();
+  bool is_all() const { return from_s == 0 && std::isinf(to_s); }
+};
+/* Its rows, packets and events within the interval, and all else that it holds. */
+std::unique_ptr<LineSource> within(std::unique_ptr<LineSource> lines, const TimeSpan &interval);
 
 } // namespace fingertip
 #pragma GCC visibility pop

@@ -397,10 +397,6 @@ bool Reader::next(Message &message) {
   return true;
 }
 
-const Reader::Message *Reader::with_last(const std::string &type) const {
-  return find_in(messages_, [&](const Message &each) { return each.type == type; });
-}
-
 bool Reader::knows(const std::string &type) const {
   return std::any_of(channels_.begin(), channels_.end(), [&](const auto &each) { return each.second.type == type; });
 }
@@ -442,14 +438,20 @@ void Reader::read_index() {
       if (opcode == SCHEMA || opcode == CHANNEL) {
         judge(opcode, content, 1);
       } else if (opcode == CHUNK_INDEX) {
-        const auto begin_ns = fields.get<std::uint64_t>();
-        fields.get<std::uint64_t>(); /* the end */
-        begins_ns[std::min(fields.get<std::uint64_t>(), *summary_)] = begin_ns;
+        const auto begin_ns = fields.get<std::uint64_t>(), end_ns = fields.get<std::uint64_t>();
+        const auto at = std::min(fields.get<std::uint64_t>(), *summary_);
+        fields.get<std::uint64_t>(); /* the length */
+        Span &span = spans_[static_cast<std::streamoff>(at)] = {begin_ns, end_ns, {}};
+        for (Fields channels(fields.text()); !channels.rest().empty(); channels.get<std::uint64_t>()) {
+          span.channels.push_back(channels.get<std::uint16_t>());
+        }
+        begins_ns[at] = begin_ns;
       }
     }
   } catch (const Damage &) {
     schemas_.clear();
     channels_.clear();
+    spans_.clear();
     return;
   }
   std::vector<std::pair<std::uint64_t, std::uint64_t>> by_time;
@@ -465,6 +467,22 @@ void Reader::read_index() {
     order_[static_cast<std::streamoff>(by_time[i].second)] =
         static_cast<std::streamoff>(i + 1 < by_time.size() ? by_time[i + 1].second : *summary_);
   }
+}
+
+void Reader::want(std::uint64_t from_ns, std::uint64_t to_ns, IsNeeded is_needed) {
+  from_ns_ = from_ns;
+  to_ns_ = to_ns;
+  is_needed_ = std::move(is_needed);
+}
+
+/* The chunk that is read. */
+bool Reader::is_left_out() const {
+  const auto found = spans_.find(record_);
+  return is_needed_ && found != spans_.end() && (found->second.end_ns < from_ns_ || found->second.begin_ns > to_ns_) &&
+         std::none_of(found->second.channels.begin(), found->second.channels.end(), [&](std::uint16_t id) {
+           const auto channel = channels_.find(id);
+           return channel == channels_.end() || is_needed_(channel->second.topic, channel->second.type);
+         });
 }
 
 /* Of the record that is read, which ends there: where to read on. */
@@ -502,6 +520,11 @@ bool Reader::read_record() {
     return false;
   }
   if (opcode != SCHEMA && opcode != CHANNEL && opcode != MESSAGE && opcode != CHUNK) {
+    next_ = next;
+    return true;
+  }
+  if (opcode == CHUNK && is_left_out()) {
+    has_left_out_ = true;
     next_ = next;
     return true;
   }
@@ -545,10 +568,10 @@ void Reader::judge(std::uint8_t opcode, std::string_view content, int depth) {
       throw Damage("a message on an unknown channel");
     }
     fields.get<std::uint32_t>(); /* sequence */
-    fields.get<std::uint64_t>(); /* times */
-    fields.get<std::uint64_t>();
+    const auto time_ns = fields.get<std::uint64_t>();
+    fields.get<std::uint64_t>(); /* of publishing */
     const Channel &found = channel->second;
-    messages_.push_back({found.topic, found.type, std::string(fields.rest())});
+    messages_.push_back({found.topic, found.type, std::string(fields.rest()), time_ns});
   } else if (opcode == CHUNK && depth == 0) {
     read_chunk(content);
   }

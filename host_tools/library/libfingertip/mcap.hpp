@@ -89,7 +89,9 @@ public:
   struct Message {
     std::string topic, type; /* the name of its schema */
     std::string data;
+    std::uint64_t time_ns;
   };
+  using IsNeeded = std::function<bool(const std::string &topic, const std::string &type)>;
   struct Place {
     std::streamoff offset = 0;
     std::size_t message = 0; /* messages between the offset and the position */
@@ -99,10 +101,15 @@ public:
 
   /* False at the end. Throws Damage. */
   bool next(Message &message);
-  /* Of this type, among those that were read together with the last one; nullptr: none. */
-  const Message *with_last(const std::string &type) const;
+  /* The last one, and those that were read together with it. */
+  const std::vector<Message> &together() const { return messages_; }
   /* Whether a channel has it. */
   bool knows(const std::string &type) const;
+  /* From now on chunks outside of these times are left out, if there is an index, unless a needed channel is in them.
+   */
+  void want(std::uint64_t from_ns, std::uint64_t to_ns, IsNeeded is_needed);
+  /* Whether one was, since this was asked. */
+  bool has_left_out() { return std::exchange(has_left_out_, false); }
   /* At the end: whether the file breaks off. */
   bool is_torn() const { return torn_; }
 
@@ -120,6 +127,7 @@ private:
   bool read_record();
   void read_index();
   std::streamoff after(std::streamoff end) const;
+  bool is_left_out() const;
 
   std::unique_ptr<ByteSource> bytes_;
   std::streamoff record_ = sizeof MAGIC; /* the one whose messages wait */
@@ -131,8 +139,16 @@ private:
   bool has_index_ = false;                         /* it was read, if there is one */
   std::optional<std::uint64_t> summary_;           /* where it begins, once that is known; 0: there is none */
   std::map<std::streamoff, std::streamoff> order_; /* of chunks: the one after each by time; empty: as in the file */
-  std::streamoff first_ = sizeof MAGIC;            /* of them */
-  std::map<std::uint16_t, std::string> schemas_;   /* their names */
+  struct Span {
+    std::uint64_t begin_ns, end_ns;
+    std::vector<std::uint16_t> channels;
+  };
+  std::map<std::streamoff, Span> spans_; /* of chunks, by the index */
+  std::uint64_t from_ns_ = 0, to_ns_ = UINT64_MAX;
+  IsNeeded is_needed_;
+  bool has_left_out_ = false;
+  std::streamoff first_ = sizeof MAGIC;          /* of them */
+  std::map<std::uint16_t, std::string> schemas_; /* their names */
   std::map<std::uint16_t, Channel> channels_;
 };
 

@@ -18,6 +18,7 @@ namespace {
 
 constexpr const char *CONTACT = "fingertip_msgs/Contact";
 constexpr const char *LINE = "fingertip_msgs/Line";
+constexpr const char *PERIODIC_LINES = "/fingertip/lines/periodic"; /* those that each second has */
 constexpr const char *PRESSURES = "sensor_msgs/PointCloud2";
 constexpr std::size_t WAITING_MOST = 1 << 16; /* lines for one before them, before it counts as lost: 50 s, 50 MB */
 constexpr std::uint64_t MESSAGE_MOST_bytes = 1 << 20; /* packed by itself */
@@ -88,6 +89,13 @@ std::optional<std::pair<std::string, std::string>> key_and_value(const std::stri
                    std::string(trim(std::string_view(text).substr(colon + 2))));
 }
 
+/* Of a line that each second or more has. */
+bool is_periodic(const std::string &text) {
+  const auto pair = key_and_value(text);
+  const std::string key = pair ? pair->first.substr(pair->first.find('/') + 1) : "";
+  return key == "clock" || key == "grip" || (key == "packet" && begins_with(pair->second, PACKET_HEALTH));
+}
+
 void set(mcap::Pairs &pairs, const std::string &key, const std::string &value) {
   if (auto *found = find_in(pairs, [&](const auto &pair) { return pair.first == key; })) {
     found->second = value;
@@ -121,7 +129,7 @@ std::string serial_in(const std::string &topic) {
 }
 
 mcap::Reader::Message line_message(const ros::Line &line) {
-  return {"/fingertip/lines", full_name(LINE), ros::encode({0, ""}, line)};
+  return {"/fingertip/lines", full_name(LINE), ros::encode({0, ""}, line), 0};
 }
 
 std::string joint_cells(std::uint32_t device, double time_us) {
@@ -130,19 +138,19 @@ std::string joint_cells(std::uint32_t device, double time_us) {
 
 } // namespace
 
-McapLineSink::LogClock::LogClock(const std::string &started_utc, const std::string &started_device_us)
+LogClock::LogClock(const std::string &started_utc, const std::string &started_device_us)
     : begin_ns_(utc_ns(started_utc).value_or(0)), now_ns_(begin_ns_) {
   if (auto device_us = to_u64(started_device_us)) {
     anchor_ = {begin_ns_, *device_us};
   }
 }
 
-void McapLineSink::LogClock::event(std::string_view text) {
+void LogClock::event(std::string_view text) {
   std::size_t blank = text.rfind(' ');
   event_ns_ = utc_ns(std::string(text.substr(blank == std::string_view::npos ? 0 : blank + 1))).value_or(event_ns_);
 }
 
-void McapLineSink::LogClock::row(std::uint64_t t_us, std::optional<double> time_us) {
+void LogClock::row(std::uint64_t t_us, std::optional<double> time_us) {
   if (time_us) {
     now_ns_ = shifted_ns(begin_ns_, *time_us);
     return;
@@ -261,6 +269,7 @@ void McapLineSink::begin() {
     return writer_.channel(topic, schemas[name], "cdr", {{"offered_qos_profiles", ""}});
   };
   lines_ = channel("/fingertip/lines", LINE);
+  periodic_lines_ = channel(PERIODIC_LINES, LINE);
   diagnostics_ = channel("/diagnostics", "diagnostic_msgs/DiagnosticArray");
   for (Device &device : devices_) {
     std::string root = "/fingertip/" + ros::name_in_ros(device.serial) + "/";
@@ -290,7 +299,7 @@ void McapLineSink::put_line(const std::string &text, bool torn) {
   if (!is_text(text)) {
     throw Error(path() + ": line " + std::to_string(number_) + " is no UTF-8 text, which an MCAP file cannot hold");
   }
-  add(lines_, ros::encode({clock_.now_ns(), ""}, ros::Line{number_, text, torn}));
+  add(is_periodic(text) ? periodic_lines_ : lines_, ros::encode({clock_.now_ns(), ""}, ros::Line{number_, text, torn}));
 }
 
 /* In order of time, so that no tool changes their order, although rows of several may step back in time. */
@@ -381,10 +390,14 @@ bool McapLineSource::next(Line &line) {
   try {
     for (;;) {
       const auto first = waiting_.begin();
-      if (first != waiting_.end() && (is_ended_ || first->first <= number_ + 1 || waiting_.size() > WAITING_MOST)) {
+      if (first != waiting_.end() &&
+          (is_ended_ || first->first <= std::max(number_ + 1, left_out_until_) || waiting_.size() > WAITING_MOST)) {
         const auto next = waiting_.extract(first);
+        const std::uint64_t gap = next.key() > number_ + 1 ? next.key() - number_ - 1 : 0;
         number_ = std::max(number_, next.key());
         line = line_of(next.key(), next.mapped());
+        line.left_out = next.key() <= left_out_until_ ? gap : 0;
+        line.time_s = (static_cast<double>(next.mapped().time_ns) - static_cast<double>(begin_ns_.value_or(0))) / 1e9;
         return true;
       }
       if (is_ended_) {
@@ -430,8 +443,28 @@ void McapLineSource::take(mcap::Reader::Message message) {
   if (is_contact && topic_.empty() && !reader_.knows(full_name(LINE))) {
     make_head(message);
   }
+  if (!begin_ns_) {
+    begin_ns_ = message.time_ns;
+    for (const auto &each : reader_.together()) {
+      begin_ns_ = each.type == message.type ? std::min(*begin_ns_, each.time_ns) : *begin_ns_;
+    }
+    if (!wanted_s_.is_all()) {
+      const auto at = [&](double s) { return shifted_ns(*begin_ns_, s * 1e6); };
+      reader_.want(at(wanted_s_.from_s), at(wanted_s_.to_s), [](const std::string &topic, const std::string &type) {
+        return type == full_name(LINE) && topic != PERIODIC_LINES;
+      });
+    }
+  }
   if (topic_.empty()) {
-    waiting_.emplace(ros::line_number(message.data), std::move(message));
+    const std::uint64_t number = ros::line_number(message.data);
+    if (reader_.has_left_out()) {
+      left_out_until_ = number;
+      for (const auto &each : reader_.together()) {
+        const bool is_ours = each.type == full_name(CONTACT) || each.type == full_name(LINE);
+        left_out_until_ = is_ours ? std::min(left_out_until_, ros::line_number(each.data)) : left_out_until_;
+      }
+    }
+    waiting_.emplace(number, std::move(message));
   } else if (!is_contact) {
     throw Error(ErrorCode::unread_kind,
                 path_ + ": chunks in another order than that of time, and no index: mcap recover FILE -o OUT");
@@ -451,7 +484,7 @@ void McapLineSource::make_head(const mcap::Reader::Message &contact) {
   const std::uint8_t sensors = row && row->raw ? row->raw->body.raw.sensor_count : std::uint8_t{0};
   std::vector<std::string> lines = {std::string(FIRST_WORDS) + FORMAT_OF_ONE, "# serial: " + serial_in(topic_),
                                     "# sensors: " + std::to_string(sensors)};
-  const auto *cloud = reader_.with_last(full_name(PRESSURES));
+  const auto *cloud = find_in(reader_.together(), [](const auto &each) { return each.type == full_name(PRESSURES); });
   for (std::size_t axis = 0; cloud && axis < 2; axis++) {
     lines.push_back(axis == 0 ? "# x_mm:" : "# y_mm:");
     for (double mm : ros::locations_mm(cloud->data, sensors, axis)) {

@@ -17,6 +17,24 @@
 
 namespace fingertip {
 
+/* When a row was measured, ns since 1970: by the beginning of the recording and what the clocks show since then. */
+class LogClock {
+public:
+  LogClock() = default;
+  LogClock(const std::string &started_utc, const std::string &started_device_us);
+  void event(std::string_view text);
+  void row(std::uint64_t t_us, std::optional<double> time_us);
+  std::uint64_t now_ns() const { return now_ns_; }
+  double seconds() const { return static_cast<double>(now_ns_ - begin_ns_) / 1e9; }
+
+private:
+  struct Anchor {
+    std::uint64_t utc_ns, device_us;
+  };
+  std::uint64_t begin_ns_ = 0, now_ns_ = 0, event_ns_ = 0, last_us_ = 0;
+  std::optional<Anchor> anchor_;
+};
+
 class McapLineSink : public LineSink {
 public:
   explicit McapLineSink(std::unique_ptr<ByteSink> file);
@@ -29,23 +47,6 @@ public:
   std::string unread_rows() const override;
 
 private:
-  /* When a row was measured. */
-  class LogClock {
-  public:
-    LogClock() = default;
-    LogClock(const std::string &started_utc, const std::string &started_device_us);
-    void event(std::string_view text);
-    void row(std::uint64_t t_us, std::optional<double> time_us);
-    std::uint64_t now_ns() const { return now_ns_; }
-
-  private:
-    struct Anchor {
-      std::uint64_t utc_ns, device_us;
-    };
-    std::uint64_t begin_ns_ = 0, now_ns_ = 0, event_ns_ = 0, last_us_ = 0;
-    std::optional<Anchor> anchor_;
-  };
-
   struct Device {
     std::string serial, frame_id;
     std::uint16_t contact = 0, wrench = 0, place = 0, pressures = 0; /* channels */
@@ -76,7 +77,7 @@ private:
   int sets_ = 0;          /* of columns that came later, as in the header */
   bool has_rows_ = false; /* the header is a known one */
   std::vector<Device> devices_;
-  std::uint16_t lines_ = 0, diagnostics_ = 0; /* channels */
+  std::uint16_t lines_ = 0, periodic_lines_ = 0, diagnostics_ = 0; /* channels */
   LogClock clock_;
   std::uint64_t last_ns_ = 0; /* of the messages */
   std::uint64_t unread_count_ = 0;
@@ -94,6 +95,7 @@ public:
   bool next(Line &line) override;
   Place place() override;
   void go_to(const Place &place) override;
+  void want(double from_s, double to_s) override { wanted_s_ = {from_s, to_s}; }
 
 private:
   using Waiting = std::multimap<std::uint64_t, mcap::Reader::Message>;
@@ -109,6 +111,9 @@ private:
   Waiting waiting_;   /* by their numbers, for those before them */
   std::string topic_; /* of contacts in a file without lines, whose numbers are counted here */
   bool is_ended_ = false;
+  TimeSpan wanted_s_;
+  std::optional<std::uint64_t> begin_ns_; /* of the first line */
+  std::uint64_t left_out_until_ = 0;      /* lines before this one may be those of chunks that were left out */
   bool joint_ = false;
   std::uint8_t sensor_count_ = 0;
   int sets_ = 0;                                /* of columns that came later, as in the header */

@@ -1,12 +1,17 @@
 #include "libfingertip/packet_file.hpp"
 
+#include "libfingertip/error.hpp"
+
 #include <utility>
 
 namespace fingertip {
 
-PacketFile::PacketFile(const std::string &path, bool salvage, const std::string &device) : bytes_(open_bytes(path)) {
+PacketFile::PacketFile(const std::string &path, bool salvage, const std::string &device, const TimeSpan &interval)
+    : bytes_(open_bytes(path)) {
   if (is_recording(path, *bytes_)) {
-    reader_ = std::make_unique<RecordingReader>(path, salvage, device);
+    reader_ = std::make_unique<RecordingReader>(path, salvage, device, interval);
+  } else if (!interval.is_all()) {
+    throw Error(path + ": bytes of a line have no times to choose from; fingertip convert makes a recording of them");
   }
 }
 

@@ -24,7 +24,7 @@ public:
 
   /* Throws Error if the file cannot be read; so does next for a damaged line, unless salvaging.
    * device: the serial number of one of several fingertips in the file. */
-  PacketFile(const std::string &path, bool salvage, const std::string &device = "");
+  PacketFile(const std::string &path, bool salvage, const std::string &device = "", const TimeSpan &interval = {});
   /* All fingertips in other bytes than those of a file, whose other exceptions than Error pass: next may then be
    * called again. path: for messages. */
   PacketFile(const std::string &path, bool salvage, std::unique_ptr<ByteSource> bytes);

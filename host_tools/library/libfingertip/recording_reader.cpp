@@ -72,6 +72,95 @@ private:
   char end_ = '\n';
 };
 
+/* See within. */
+class LinesWithin : public LineSource {
+public:
+  LinesWithin(std::unique_ptr<LineSource> lines, const TimeSpan &interval)
+      : lines_(std::move(lines)), interval_(interval) {
+    lines_->want(interval.from_s, interval.to_s);
+  }
+
+  bool next(Line &line) override {
+    while (!state_.is_over && !state_.is_ended && lines_->next(line)) {
+      state_.left_out += line.left_out;
+      state_.number = line.number;
+      if (is_wanted(line)) {
+        line.left_out = std::exchange(state_.left_out, 0);
+        return true;
+      }
+      state_.left_out++;
+    }
+    if (!std::exchange(state_.is_over, false)) {
+      return false;
+    }
+    state_.is_ended = true;
+    line = {state_.number + 1, "# end: reason=part", false, state_.left_out};
+    return true;
+  }
+  Place place() override {
+    Place inner = lines_->place();
+    return {inner.offset, inner.message, inner.number, std::pair(inner, state_)};
+  }
+  void go_to(const Place &place) override {
+    const auto &[inner, state] = std::any_cast<const std::pair<Place, State> &>(place.waiting);
+    lines_->go_to(inner);
+    state_ = state;
+  }
+
+private:
+  static constexpr double LATE_s = 1; /* rows come behind later ones by less */
+  struct State {
+    LogClock clock;
+    std::string started_utc, started_device_us;
+    bool joint = false, has_header = false, is_inside = false, is_over = false, is_ended = false;
+    std::uint64_t left_out = 0, number = 0;
+  };
+
+  bool is_wanted(Line &line) {
+    const std::string &text = line.text;
+    if (text.empty() || line.torn) {
+      return true;
+    }
+    if (text[0] != '#') {
+      return !std::exchange(state_.has_header, true) || is_row_wanted(line);
+    }
+    const std::size_t colon = text.find(": ");
+    const std::string key(trim(std::string_view(text).substr(1, colon == std::string::npos ? colon : colon - 1)));
+    const std::string value = colon == std::string::npos ? "" : text.substr(colon + 2);
+    const std::string own = key.substr(key.find('/') + 1);
+    state_.joint = state_.joint || text == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
+    if (own == "event") {
+      state_.clock.event(value);
+    } else if (own == "end") { /* counts of all of it */
+      state_.is_over = key == own;
+      return false;
+    } else if (!state_.has_header && (key == "started_utc" || key == "started_device_us")) {
+      (key == "started_utc" ? state_.started_utc : state_.started_device_us) = value;
+      state_.clock = LogClock(state_.started_utc, state_.started_device_us);
+    }
+    const bool has_time = own == "event" || own == "clock" || own == "grip" || own == "packet";
+    return !state_.has_header || !has_time || state_.is_inside || value.rfind(PACKET_INFO, 0) == 0;
+  }
+
+  bool is_row_wanted(const Line &line) {
+    const auto cells = split(std::string_view(line.text).substr(0, 80), ',');
+    const auto time_us = state_.joint && cells.size() > 2 ? to_double(cells[1]) : std::nullopt;
+    const auto t_us = state_.joint ? std::nullopt : to_u64(cells[0]);
+    if (!time_us && !t_us) {
+      return true; /* its reader reports what is wrong */
+    }
+    state_.clock.row(t_us.value_or(0), time_us);
+    const double s = time_us ? *time_us / 1e6 : std::isnan(line.time_s) ? state_.clock.seconds() : line.time_s;
+    state_.is_inside = s >= interval_.from_s && s <= interval_.to_s;
+    state_.is_over = s > interval_.to_s + LATE_s;
+    return state_.is_inside;
+  }
+
+  std::unique_ptr<LineSource> lines_;
+  TimeSpan interval_;
+  State state_;
+};
+
 /* The format in the first line, "1" or "2". Throws Error with what it is instead. */
 std::string format_of(const std::string &path, const std::string &line) {
   std::string_view words = trim(line);
@@ -142,8 +231,13 @@ std::unique_ptr<LineSource> lines_of(const std::string &path, std::unique_ptr<By
   return std::make_unique<TextLines>(std::move(bytes));
 }
 
-RecordingReader::RecordingReader(const std::string &path, bool salvage, const std::string &device)
-    : path_(path), salvage_(salvage), source_(open_lines(path)), wanted_(device) {
+std::unique_ptr<LineSource> within(std::unique_ptr<LineSource> lines, const TimeSpan &interval) {
+  return interval.is_all() ? std::move(lines) : std::make_unique<LinesWithin>(std::move(lines), interval);
+}
+
+RecordingReader::RecordingReader(const std::string &path, bool salvage, const std::string &device,
+                                 const TimeSpan &interval)
+    : path_(path), salvage_(salvage), source_(within(open_lines(path), interval)), wanted_(device) {
   begin();
 }
 
@@ -208,8 +302,8 @@ bool RecordingReader::read_next() {
     return true;
   }
   auto place = [&] { return path_ + ":" + std::to_string(line.number) + ": "; };
-  if (line.number > state_.line_number + 1) {
-    std::uint64_t lost = line.number - state_.line_number - 1;
+  if (line.number > state_.line_number + 1 + line.left_out) {
+    std::uint64_t lost = line.number - state_.line_number - 1 - line.left_out;
     damaged(place() + std::to_string(lost) + " lines are missing before it", lost);
   }
   state_.line_number = line.number;
@@ -370,6 +464,9 @@ void RecordingReader::put_info(std::uint32_t device, wire_packet packet, bool ma
 
 void RecordingReader::read_end(std::string_view text) {
   LineStatistics statistics;
+  if (text == "reason=part") {
+    return; /* of a part of a recording, whose counts are those of its packets */
+  }
   for (std::string_view word : split(text, ' ')) {
     std::size_t equals = word.find('=');
     if (equals == std::string_view::npos) {

@@ -33,7 +33,7 @@ public:
 
   /* salvage: skip damaged lines and count them, instead of throwing Error with file and line.
    * device: the serial number of one of several fingertips; empty: the only one. */
-  RecordingReader(const std::string &path, bool salvage, const std::string &device = "");
+  RecordingReader(const std::string &path, bool salvage, const std::string &device = "", const TimeSpan &interval = {});
   /* Reads all fingertips, from other lines than those of a file. Nothing is read before next. Other
    * exceptions of the lines than Error pass: next may then be called again. path: for messages. */
   RecordingReader(std::string path, bool salvage, std::unique_ptr<LineSource> lines);

@@ -32,6 +32,7 @@ without contact belong to neither.
 import argparse
 import functools
 import json
+import math
 import sys
 
 import numpy as np
@@ -140,13 +141,17 @@ class Comparison:
 def add_recording_options(parser):
     parser.add_argument("--salvage", action="store_true", help="skip damaged lines of the recording and print how many")
     parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")
+    parser.add_argument(
+        "--from", dest="from_s", type=float, default=0.0, metavar="S", help="leave out what is before, since the recording began"
+    )
+    parser.add_argument("--to", dest="to_s", type=float, default=math.inf, metavar="S", help="leave out what is after")
 
 
 def load_recording(options, **how):
     devices = recorded_devices(options.recording)
     if len(devices) > 1 and not options.device:
         raise InputError(f"{options.recording}: holds several fingertips; choose one with --device: {' '.join(devices)}")
-    recording = read_recording(options.recording, options.salvage, options.device, **how)
+    recording = read_recording(options.recording, options.salvage, options.device, from_s=options.from_s, to_s=options.to_s, **how)
     if recording.skipped_lines:
         print(f"{printable(options.recording)}: {recording.skipped_lines} damaged lines skipped", file=sys.stderr)
     if not recording.end:

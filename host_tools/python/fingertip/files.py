@@ -35,7 +35,7 @@ from .errors import InputError
 from .frames import Edge, frame_of
 from .grip_table import State
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
-from .mcap_recording import MAGIC, Contacts, Damaged, Line, McapLineReader
+from .mcap_recording import MAGIC, Contacts, Damaged, Line, LogClock, McapLineReader, Skipped
 from .recorded import Array, Rows, counts_of, judge_key, packet_of
 
 if TYPE_CHECKING:
@@ -302,6 +302,7 @@ class Recording:
 
 # Some 20 MB are read in a second: below this the wait is short.
 WORTH_WAITING_bytes = 10_000_000
+LATE_s = 1.0  # a row may come behind later ones by less than this
 BLOCK_bytes, ROWS_AT_ONCE = 500_000, 1024  # about the same; more take no less time each
 JOINT_COLUMNS = "device,time_us,"
 
@@ -329,8 +330,8 @@ class Stretch(NamedTuple):
 class _RecordingLines:
     """The lines of a recording, CSV or MCAP, one after the other: number, text without its end, whether it is torn; or Damaged."""
 
-    def __init__(self, path: Path, progress: Callable[[float], None] | None = None) -> None:
-        self.path, self.progress = path, progress
+    def __init__(self, path: Path, progress: Callable[[float], None] | None = None, interval_s: tuple[float, float] | None = None) -> None:
+        self.path, self.progress, self.interval_s = path, progress, interval_s
         first = next(iter(self), (1, "", True))
         if isinstance(first, Damaged):
             raise first
@@ -341,16 +342,16 @@ class _RecordingLines:
             if isinstance(each, Stretch):
                 for number, text in enumerate(each.texts, each.number):
                     yield number, text, False
-            elif not isinstance(each, Contacts):
+            elif not isinstance(each, (Contacts, Skipped)):
                 yield each
 
-    def stretches(self) -> Iterator["Line | Damaged | Stretch | Contacts"]:
+    def stretches(self) -> Iterator["Line | Damaged | Stretch | Contacts | Skipped"]:
         """The same, but rows, or what else is neither comment nor blank, many at a time."""
         try:
             with open(self.path, "rb") as file:
                 start = file.read(16384)
                 if start.startswith(MAGIC):
-                    self.mcap = McapLineReader(self.path, self.progress)
+                    self.mcap = McapLineReader(self.path, self.progress, self.interval_s)
                     yield from self.mcap.items()
                     return
                 for magic, what in _OTHERS.items():
@@ -405,7 +406,12 @@ def _choose_device(path: Path, devices: list[str], wanted: str | None) -> int:
 class _Reading:
     """A recording while it is read, line by line."""
 
-    def __init__(self, path: Path, is_joint: bool, serial: str | None, columns: Collection[str] | None) -> None:
+    def __init__(
+        self, path: Path, is_joint: bool, serial: str | None, columns: Collection[str] | None, interval_s: tuple[float, float] | None
+    ) -> None:
+        self.interval_s = interval_s
+        self.clock = LogClock({})
+        self.is_over = False
         self.path, self.is_joint, self.serial, self.columns = path, is_joint, serial, columns
         self.number: int | None = None  # of the wanted fingertip among several
         self.rows: Rows | None = None  # once there is a header
@@ -450,6 +456,7 @@ class _Reading:
             self.rows = Rows(text)
         except ValueError:
             raise ValueError(wrong) from None
+        self.clock = LogClock(self.metadata)
         names = self.rows.names
         self.wanted = (
             tuple(range(len(names))) if self.columns is None else tuple(sorted(names.index(name) for name in self.columns if name in names))
@@ -477,12 +484,31 @@ class _Reading:
             self.put(found, numbers[at : at + len(found)], times_us[at : at + len(found)])
             at += len(found)
 
-    def take_contacts(self, numbers: list[int], devices: Array, times_us: Array, table: Array) -> None:
+    def take_contacts(self, numbers: list[int], devices: Array, times_us: Array, table: Array, times_s: list[float]) -> None:
         """Messages of an MCAP file, as McapLineReader.tables has them."""
         mine = np.flatnonzero(devices == self.number) if self.is_joint else slice(None)
-        self.put(table[mine], np.array(numbers, "q")[mine].tolist(), times_us[mine].tolist() if self.is_joint else ())
+        mine_us = times_us[mine].tolist() if self.is_joint else ()
+        self.put(table[mine], np.array(numbers, "q")[mine].tolist(), mine_us, np.array(times_s)[mine])
 
-    def put(self, found: Array, numbers: Sequence[int], times_us: Sequence[float]) -> None:
+    def _times_s(self, found: Array, times_us: Sequence[float]) -> Array:
+        """Since the recording began, as the log times of an MCAP file."""
+        if self.is_joint:
+            return np.array(times_us) / 1e6
+        t_us, runs = found[:, 0], np.flatnonzero(np.diff(found[:, 0]) < 0) + 1
+        times_s = np.empty(len(t_us))
+        for begin, end in zip([0, *runs.tolist()], [*runs.tolist(), len(t_us)]):
+            begin_ns = self.clock.row(int(t_us[begin]), math.nan) if end > begin else 0
+            times_s[begin:end] = (begin_ns - self.clock.begin_ns) / 1e9 + (t_us[begin:end] - t_us[begin]) / 1e6
+            self.clock.row(int(t_us[end - 1]), math.nan)
+        return times_s
+
+    def put(self, found: Array, numbers: Sequence[int], times_us: Sequence[float], times_s: Array | None = None) -> None:
+        if self.interval_s is not None and len(found):
+            times_s = self._times_s(found, times_us) if times_s is None else times_s
+            inside = np.flatnonzero((times_s >= self.interval_s[0]) & (times_s <= self.interval_s[1])).tolist()
+            self.is_over = bool(times_s.min() > self.interval_s[1] + LATE_s)
+            found, numbers = found[inside], [numbers[at] for at in inside]
+            times_us = [times_us[at] for at in inside] if self.is_joint else ()
         if len(found) and not self.has_info:  # of a recorder that has written none
             self.has_info = True
             if 1 <= self.info_sensors <= SENSORS_MAX:
@@ -509,6 +535,7 @@ class _Reading:
             counts = dict(pair.split("=", 1) for pair in value.split(" ") if "=" in pair) if self.is_joint else counts_of(value)
             self.end = {**counts, **self.own_end}
         elif key == "event":
+            self.clock.event(value)
             self.events.append(value)
             self.event_lines.append(line)
         elif key == "packet":
@@ -534,13 +561,21 @@ def read_recording(
     serial: str | None = None,
     columns: Collection[str] | None = None,
     progress: Callable[[float], None] | None = None,
+    from_s: float = 0.0,
+    to_s: float = math.inf,
 ) -> Recording:
     """serial: of one of several fingertips. columns: only these (t_us and frame among them), for recordings
-    that are too large to hold whole; then there are no sensors. progress: called now and then with the share that was read."""
-    lines = _RecordingLines(path, progress)
-    reading = _Reading(path, lines.format == "2", serial, columns)
+    that are too large to hold whole; then there are no sensors. progress: called now and then with the share that was read.
+    from_s, to_s: only rows of this time since the recording began, and events and packets of what was read for them; MCAP files are
+    read there by their index. Times are the log times of RECORDING.md."""
+    if not 0 <= from_s <= to_s:
+        raise InputError(f"from {from_s:g} s to {to_s:g} s is no time in a recording; give 0 or more, the earlier first")
+    interval_s = None if (from_s, to_s) == (0, math.inf) else (from_s, to_s)
+    lines = _RecordingLines(path, progress, interval_s)
+    reading = _Reading(path, lines.format == "2", serial, columns, interval_s)
     skipped = 0
     last: int | None = None  # line's number
+    skipped_to = 0
 
     def damaged(error: InputError, lost: int) -> None:
         nonlocal skipped
@@ -564,7 +599,7 @@ def read_recording(
 
     def follow(number: int, to: int) -> None:
         nonlocal last
-        if last is not None and number > last + 1:
+        if last is not None and number > max(last + 1, skipped_to):
             reading.take_rows(wrong)
             damaged(
                 InputError(f"{path}:{number}: {number - last - 1} lines are missing before it; use --salvage to go on"), number - last - 1
@@ -572,8 +607,13 @@ def read_recording(
         last = to
 
     for each in lines.stretches():
-        if isinstance(each, (Damaged, Contacts)):
+        if reading.is_over:
+            break
+        if isinstance(each, (Damaged, Contacts, Skipped)):
             reading.take_rows(wrong)
+        if isinstance(each, Skipped):
+            skipped_to = each.to
+            continue
         if isinstance(each, Damaged):
             damaged(each, 0)  # the next one's number shows how many lines are lost
         elif isinstance(each, Contacts):
@@ -601,6 +641,8 @@ def read_recording(
     reading.take_rows(wrong)
     if reading.rows is None:
         raise InputError(f"{path}: no header line; record again")
+    if interval_s and not reading.end:
+        reading.end = {"reason": "part"}
     return Recording(reading, [reading.rows.names[i] for i in reading.wanted], skipped)
 
 

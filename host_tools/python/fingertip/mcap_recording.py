@@ -36,6 +36,7 @@ CHUNK_MOST_bytes = 1 << 28  # of one that is read
 MESSAGE_MOST_bytes = 1 << 20  # of one that is packed by itself
 WAITING_MOST = 1 << 16  # lines that wait for one before them, before it counts as lost
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 3, 4, 5, 6, 15  # opcodes
+_PERIODIC = re.compile("# (?:[0-9]+/)?(?:clock: |grip: |packet: health )")  # lines that each second or more has
 _ZSTD = b"\x28\xb5\x2f\xfd"
 
 _COUNTS = ("sequence", "flags", "sensors_used", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us", "total_us")
@@ -75,12 +76,12 @@ def _clamp_ns(time_ns: int) -> int:
     return min(max(time_ns, 0), LATEST_ns)
 
 
-class _LogClock:
+class LogClock:
     """When a row was measured, ns since 1970: the begin of the recording by the computer's clock, and then device time, or in a recording of
     several the recorder's."""
 
     def __init__(self, head: dict[str, str]) -> None:
-        self._utc_ns = self.last_ns = _utc_ns(head.get("started_utc", "")) or 0
+        self.begin_ns = self._utc_ns = self.last_ns = _utc_ns(head.get("started_utc", "")) or 0
         started = head.get("started_device_us", "")
         self._anchor = (self._utc_ns, int(started)) if started.isascii() and started.isdigit() else None
         self._event_ns = 0
@@ -155,7 +156,7 @@ class McapLines:
         self._devices: list[_Device] = []
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
-        self._clock = _LogClock({})
+        self._clock = LogClock({})
         self._closed = False
 
     def line(self, text: str) -> None:
@@ -189,7 +190,7 @@ class McapLines:
             device, own = self._device_of(key)
             if device:
                 device.key(own, value)
-        self._clock = _LogClock(keys)
+        self._clock = LogClock(keys)
         now_ns = self._clock.last_ns
         self._writer.add_metadata("fingertip_recording", keys)
         for device in self._devices:
@@ -201,7 +202,9 @@ class McapLines:
         for name in TYPES:
             self._schemas[name] = self._writer.register_schema(name.replace("/", "/msg/"), "ros2msg", schema_of(name).encode("utf-8"))
         self._channels = {
-            name: self._channel(topic, name) for name, topic in ((LINE_TYPE, "/fingertip/lines"), (DIAGNOSTICS_TYPE, "/diagnostics"))
+            LINE_TYPE: self._channel("/fingertip/lines", LINE_TYPE),
+            "periodic": self._channel("/fingertip/lines/periodic", LINE_TYPE),
+            DIAGNOSTICS_TYPE: self._channel("/diagnostics", DIAGNOSTICS_TYPE),
         }
         for device in self._devices:
             root = f"/fingertip/{name_in_ros(device.serial)}/"
@@ -250,7 +253,8 @@ class McapLines:
     def _put_line(self, text: str) -> None:
         self._number += 1
         header = {"stamp": stamp(self._clock.last_ns), "frame_id": ""}
-        self._add(self._channels[LINE_TYPE], encode(LINE_TYPE, {"header": header, "line": self._number, "text": text, "torn": False}))
+        channel = self._channels["periodic" if _PERIODIC.match(text) else LINE_TYPE]
+        self._add(channel, encode(LINE_TYPE, {"header": header, "line": self._number, "text": text, "torn": False}))
 
     def _put_row(self, text: str) -> None:
         self._number += 1
@@ -283,11 +287,19 @@ Line = tuple[int, str, bool]  # number, text, whether it is torn
 
 
 class Contacts(NamedTuple):
-    """Messages of fingertip_msgs/Contact one after the other: the lines' numbers, their topics, their bytes."""
+    """Messages of fingertip_msgs/Contact one after the other: the lines' numbers, their topics, their bytes, their times."""
 
     numbers: list[int]
     topics: list[str]
     data: list[bytes]
+    times_s: list[float]  # since the recording began
+
+
+class Skipped:
+    """Lines before this number may be among those that were left out on purpose."""
+
+    def __init__(self, to: int) -> None:
+        self.to = to
 
 
 @functools.cache
@@ -333,9 +345,14 @@ class McapLineReader:
     what its first messages hold. Raises InputError where the file cannot be read, or is none of a recording.
     """
 
-    def __init__(self, path: "str | os.PathLike[str]", progress: Callable[[float], None] | None = None) -> None:
+    def __init__(
+        self, path: "str | os.PathLike[str]", progress: Callable[[float], None] | None = None, interval_s: tuple[float, float] | None = None
+    ) -> None:
+        """interval_s: since the recording began; chunks outside are left out, if there is an index."""
         self.path = os.fspath(path)
         self._progress = progress
+        self._interval_s = interval_s
+        self._begin_ns: int | None = None
         self._mcap = _mcap()
         self._schemas: dict[int, str] = {}  # names
         self._channels: dict[int, tuple[str, str]] = {}  # topic, name of the schema
@@ -348,51 +365,55 @@ class McapLineReader:
         text = f"a damaged message on {topic} ({error}), or one of another version of the tool; use --salvage to skip it"
         return Damaged(f"{self.path}: {text}")
 
-    def items(self) -> Iterator[Line | Contacts | Damaged]:
+    def items(self) -> Iterator[Line | Contacts | Damaged | Skipped]:
         """The lines in their order, rows many at a time; what is damaged is among them, at its place."""
         for each in self._ordered():
             if isinstance(each, Contacts) and not self._has_header:
                 each = self._damaged(each.topics[0], ValueError("a row with no header line before it"))
-            yield each if isinstance(each, (Contacts, Damaged)) else self._of_line(each)
+            yield self._of_line(each) if isinstance(each, tuple) and not isinstance(each, Contacts) else each
         if not self._has_any:
             raise InputError(f"{self.path}: no recording of a fingertip; give one that fingertip has written")
         if self._is_torn:
             yield Damaged(f"{self.path}: the last chunk is torn; use --salvage to do without")
 
-    def _ordered(self) -> Iterator[Line | Contacts | Damaged]:
+    def _ordered(self) -> Iterator[Line | Contacts | Damaged | Skipped]:
         """What is in the file, each line behind those before it."""
         waits: list[tuple[int, int, Line | Contacts]] = []
-        last = order = 0
+        last = order = skipped_to = 0
         for each in itertools.chain(self._records(), (None,)):
             if isinstance(each, Damaged):
+                yield each
+                continue
+            if isinstance(each, Skipped):
+                skipped_to = each.to
                 yield each
                 continue
             singles: list[tuple[int, Line | Contacts]] = []
             if isinstance(each, Contacts):
                 numbers = np.array(each.numbers, "Q").astype(np.float64)
                 largest = np.maximum.accumulate(np.concatenate(([last], numbers)))
-                if not waits and (numbers <= largest[:-1] + 1).all():
+                if not waits and (numbers <= np.maximum(largest[:-1] + 1, skipped_to)).all():
                     last = max(last, *each.numbers)
                     yield each
                     continue
-                singles = [(number, Contacts([number], [topic], [data])) for number, topic, data in zip(*each)]
+                singles = [(number, Contacts([number], [topic], [data], [s])) for number, topic, data, s in zip(*each)]
             elif each is not None:
                 singles = [(each[0], each)]
             ready: list[Line | Contacts] = []
             for number, single in singles:
                 order += 1
                 heapq.heappush(waits, (number, order, single))
-                while waits and (waits[0][0] <= last + 1 or len(waits) > WAITING_MOST):
+                while waits and (waits[0][0] <= max(last + 1, skipped_to) or len(waits) > WAITING_MOST):
                     number, _, single = heapq.heappop(waits)
                     last = max(last, number)
                     ready.append(single)
             if each is None:
-                ready = [single for _, _, single in sorted(waits)]
+                ready += [single for _, _, single in sorted(waits)]
             for are_contacts, group in itertools.groupby(ready, lambda single: isinstance(single, Contacts)):
                 yield from [Contacts(*(list(itertools.chain(*parts)) for parts in zip(*group)))] if are_contacts else group
 
-    def _order(self, file: BinaryIO) -> list[int]:
-        """A sound index has all channels; and where chunks are in another order than that of time, their places, by time."""
+    def _index(self, file: BinaryIO) -> list[tuple[int, int, int]]:
+        """A sound index has all channels, and of each chunk when it begins, its place, when it ends, in order of time."""
         file.seek(0)
         try:
             summary = self._mcap.reader.make_reader(file).get_summary()
@@ -400,13 +421,17 @@ class McapLineReader:
             summary = None
         if summary is None:
             return []
-        times = [(each.message_start_time, each.chunk_start_offset) for each in summary.chunk_indexes]
         self._schemas = {each.id: each.name.replace("/msg/", "/") for each in summary.schemas.values()}
         self._channels = {each.id: (each.topic, self._schemas.get(each.schema_id, "")) for each in summary.channels.values()}
-        order = [place for _, place in sorted(times)]
-        return order if order != sorted(order) else []
+        return sorted((each.message_start_time, each.chunk_start_offset, each.message_end_time) for each in summary.chunk_indexes)
 
-    def _records(self) -> Iterator[Line | Contacts | Damaged]:
+    def _is_outside(self, begin_ns: int, end_ns: int) -> bool:
+        """Of the interval."""
+        if self._interval_s is None or self._begin_ns is None or not self._has_header:
+            return False
+        return (end_ns - self._begin_ns) / 1e9 < self._interval_s[0] or (begin_ns - self._begin_ns) / 1e9 > self._interval_s[1]
+
+    def _records(self) -> Iterator[Line | Contacts | Damaged | Skipped]:
         """What is in the file, in its order, or that of its chunks by time."""
         zstd_error, struct_error = self._mcap.stream_reader.zstandard.ZstdError, struct.error
         damage = (ValueError, MemoryError, RuntimeError, EOFError, struct_error, zstd_error)
@@ -415,8 +440,12 @@ class McapLineReader:
                 size = os.fstat(file.fileno()).st_size
                 if file.read(len(MAGIC)) != MAGIC:
                     raise InputError(f"{self.path}: no MCAP file; give one that fingertip has written")
-                order = self._order(file)
+                index = self._index(file)
+                order = [place for _, place, _ in index]
+                spans = {place: (begin_ns, end_ns) for begin_ns, place, end_ns in index}
+                order = order if order != sorted(order) else []
                 follows = dict(zip(order, [*order[1:], size]))
+                is_skipping = False
                 at = file.seek(order[0] if order else len(MAGIC))
                 while at < size:  # a killed writer leaves whole chunks
                     head = file.read(9)
@@ -428,9 +457,18 @@ class McapLineReader:
                         break
                     if self._progress:
                         self._progress(at / size)
+                    is_outside = at in spans and self._is_outside(*spans[at])
+                    is_skipping = is_skipping or is_outside
                     try:
-                        if head[0] == _CHUNK and length <= CHUNK_MOST_bytes:
-                            yield from self._messages(self._chunk(file.read(length)))
+                        if is_outside:
+                            pass
+                        elif head[0] == _CHUNK and length <= CHUNK_MOST_bytes:
+                            found = self._messages(self._chunk(file.read(length)))
+                            parts = (each.numbers if isinstance(each, Contacts) else each[:1] for each in found if isinstance(each, tuple))
+                            if is_skipping and found:
+                                yield Skipped(min(itertools.chain(*parts), default=0))
+                                is_skipping = False
+                            yield from found
                         elif head[0] in (_SCHEMA, _CHANNEL, _MESSAGE):
                             yield from self._messages(head + file.read(length))
                     except damage as error:
@@ -470,7 +508,7 @@ class McapLineReader:
 
     def _messages(self, data: bytes) -> list[Line | Contacts | Damaged]:
         """Those that are wanted in a row of records. Raises ValueError, or what struct raises, where one of them is damaged."""
-        wanted: list[tuple[str, str, bytes]] = []
+        wanted: list[tuple[str, str, bytes, int]] = []
         at, size, channels, unpack = 0, len(data), self._channels, struct.unpack_from
         cloud = b""
         while at < size:
@@ -488,7 +526,7 @@ class McapLineReader:
                     raise ValueError("its channel is unknown")
                 topic, name = channel
                 if name in (CONTACT_TYPE, LINE_TYPE):
-                    wanted.append((name, topic, self._unpacked(data[begin + 22 : end])))
+                    wanted.append((name, topic, self._unpacked(data[begin + 22 : end]), unpack("<Q", data, begin + 6)[0]))
                 elif name == PRESSURES_TYPE and not cloud:
                     cloud = data[begin + 22 : end]
             elif kind in (_SCHEMA, _CHANNEL):
@@ -500,20 +538,24 @@ class McapLineReader:
             found += self._made_head(contact[2], cloud)
             self._count = len(found)
         self._has_any = self._has_any or bool(wanted)
+        if self._begin_ns is None and wanted:
+            self._begin_ns = min(time_ns for name, _, _, time_ns in wanted if name == wanted[0][0])
         numbers: list[int] = []
         topics: list[str] = []
         rows: list[bytes] = []
-        for name, topic, message in wanted:
+        times_s: list[float] = []
+        for name, topic, message, time_ns in wanted:
             if name == CONTACT_TYPE and (number := self._number_of(message, topic)) is not None:
                 numbers.append(number)
                 topics.append(topic)
                 rows.append(message)
+                times_s.append((time_ns - (self._begin_ns or 0)) / 1e9)
                 continue
             if self._topic:
                 raise InputError(f"{self.path}: chunks in another order than that of time, and no index: mcap recover FILE -o OUT")
             if numbers:
-                found.append(Contacts(numbers, topics, rows))
-                numbers, topics, rows = [], [], []
+                found.append(Contacts(numbers, topics, rows, times_s))
+                numbers, topics, rows, times_s = [], [], [], []
             try:
                 row = decode(name, message)
                 if "\n" in row.get("text", "\n"):
@@ -521,7 +563,7 @@ class McapLineReader:
                 found.append((row["line"], row["text"], row["torn"]))
             except ValueError as error:
                 found.append(self._damaged(topic, error))
-        return [*found, Contacts(numbers, topics, rows)] if numbers else found
+        return [*found, Contacts(numbers, topics, rows, times_s)] if numbers else found
 
     def _number_of(self, message: bytes, topic: str) -> int | None:
         """Of a contact's line; None where there is none in it."""
@@ -577,8 +619,8 @@ class McapLineReader:
         self._has_header = self._has_header or text.strip(" \t\r")[:1] not in ("", "#")
         return line
 
-    def tables(self, contacts: Contacts, rows: Rows) -> "Iterator[tuple[list[int], Array, Array, Array] | Damaged]":
-        """Numbers, devices, times and columns, and what is damaged among them."""
+    def tables(self, contacts: Contacts, rows: Rows) -> "Iterator[tuple[list[int], Array, Array, Array, list[float]] | Damaged]":
+        """Numbers, devices, times, columns and log times, and what is damaged among them."""
         lengths = np.array(list(map(len, contacts.data)))
         fine = np.zeros(len(lengths), bool)
         table, devices, times_us = np.empty((len(lengths), len(rows.names))), np.empty(len(lengths)), np.empty(len(lengths))
@@ -604,6 +646,6 @@ class McapLineReader:
         starts = np.flatnonzero(~fine | np.concatenate(([True], ~fine[:-1] | (numbers[1:] - numbers[:-1] != 1))))
         for begin, end in zip(starts.tolist(), [*starts[1:].tolist(), len(fine)]):
             if fine[begin]:
-                yield contacts.numbers[begin:end], devices[begin:end], times_us[begin:end], table[begin:end]
+                yield contacts.numbers[begin:end], devices[begin:end], times_us[begin:end], table[begin:end], contacts.times_s[begin:end]
             else:
                 yield self._damaged(contacts.topics[begin], ValueError("no row of this recording"))

@@ -19,6 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import FancyBboxPatch
 
+from . import host_time
 from .evaluate import Comparison, add_recording_options, check_time, load_recording
 from .files import FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError
 from .files import check_output, read_grip, read_run, read_scenario, recorded_devices, restart_rows, run_tool, write_bytes
@@ -29,6 +30,8 @@ TIME_COLOURS = "winter"  # from blue to green: far from DOUBTFUL and SLIPPING
 # A legend that covers no curve.
 ABOVE = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.2, "fontsize": 8, "frameon": False}
 RIM_mm = 6.0
+POINTS = 4000  # that are drawn of a curve, some four for each pixel
+WORTH_SHOWING_s, LINES_s = 2.0, 10.0
 # All that a picture needs: 250 000 rows of these are 30 MB, of all columns 130.
 COLUMNS = ("t_us", "frame", "flags", "x_mm", "y_mm", "force_N", "qx_N", "qy_N", "q_sd_N", "tangential_ratio")
 GRASP_COLUMNS = ("t_us", "frame", "flags", "force_N")
@@ -47,17 +50,36 @@ def gaps_as_nan(t_s, values, fitted):
     """Values with NaN where nothing is fitted or frames are missing, so that lines break there."""
     values = np.where(fitted, values, np.nan)
     if len(t_s) > 2:
-        values[1:][np.diff(t_s) > 5 * np.median(np.diff(t_s))] = np.nan
+        steps_s = np.diff(t_s)
+        values[1:][steps_s > 5 * max(np.median(steps_s), np.mean(steps_s))] = np.nan
     return values
 
 
-def show_progress(share):
-    """In place on a terminal, else every tenth."""
-    percent = int(100 * share)
-    if sys.stderr.isatty():
-        print(f"\rreading {percent} %" if percent < 99 else "\r\x1b[K", end="", file=sys.stderr, flush=True)
-    elif percent % 10 == 0:
-        print(f"reading {percent} %", file=sys.stderr)
+def thinned(recording, rows):
+    """Of many rows those with the least and the largest force of each bin, and where slip begins and ends: a picture has no room for more."""
+    step = len(rows) // POINTS
+    if step < 2:
+        return rows
+    bins = len(rows) // step
+    force = np.nan_to_num(recording["force_N"][rows[: bins * step]]).reshape(bins, step)
+    first, slip = np.arange(bins) * step, np.flatnonzero(np.diff(recording.flag(SLIP)[rows]))
+    return rows[np.unique(np.concatenate((first + force.argmin(axis=1), first + force.argmax(axis=1), slip, slip + 1, [len(rows) - 1])))]
+
+
+def progress():
+    """Shows a share and the time that is left, from the third second on: in place on a terminal, else a line every ten seconds."""
+    begun_s = shown_s = host_time.now_s()
+
+    def show(share):
+        nonlocal shown_s
+        now_s = host_time.now_s()
+        if now_s - begun_s < WORTH_SHOWING_s or now_s - shown_s < (0 if sys.stderr.isatty() else LINES_s):
+            return
+        shown_s = now_s
+        text = f"reading {100 * share:.0f} %, {(now_s - begun_s) * (1 - share) / max(share, 1e-3):.0f} s left"
+        print(f"\r\x1b[K{text}" if sys.stderr.isatty() else text, end="" if sys.stderr.isatty() else "\n", file=sys.stderr, flush=True)
+
+    return show
 
 
 def continuous_time_s(recording, rows):
@@ -346,19 +368,22 @@ def main(argv):
     check_output(options.output, options.recording, options.truth, options.run, options.beside_run)
     if not options.device and not options.truth and len(recorded_devices(options.recording)) == 2:
         grip = read_grip(options.recording, options.salvage)
+        inside = (grip["time_us"] >= options.from_s * 1e6) & (grip["time_us"] <= options.to_s * 1e6) if grip else ()
+        grip = {name: values[inside] for name, values in grip.items()}
         if grip:
             fingertips = [of_device(options, serial, GRASP_COLUMNS) for serial in recorded_devices(options.recording)]
             print(f"{options.output}: {draw_grasp(options.output, grip, fingertips)}")
             return 0
     run = read_run(options.run)
     truth = read_scenario(options.truth) if options.truth else None
-    recording = load_recording(options, columns=COMPARED_COLUMNS if truth else COLUMNS, progress=show_progress)
+    recording = load_recording(options, columns=COMPARED_COLUMNS if truth else COLUMNS, progress=progress())
     if truth:
         check_time(recording)
     comparison = Comparison(recording, truth, run) if truth else None
     beside = Beside(options, truth) if options.beside else None
-    rows = recording.has_contact
-    if not rows.any():
+    rows = np.flatnonzero(recording.has_contact)
+    rows = rows if comparison else thinned(recording, rows)
+    if not len(rows):
         raise InputError(f"{options.recording}: no contact packet in it; record with the contact stream on")
     t_s, restarts_s = (comparison.t_s, ()) if comparison else continuous_time_s(recording, rows)
     x, y, force = (recording[name][rows] for name in ("x_mm", "y_mm", "force_N"))

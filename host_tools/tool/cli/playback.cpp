@@ -80,17 +80,19 @@ template <typename Reader, typename Shown> void Track<Reader, Shown>::go_back(do
   now_ = mark->position;
 }
 
-Playback::Playback(const std::string &path, bool salvage, const std::string &device, double speed) : speed_(speed) {
+Playback::Playback(const std::string &path, bool salvage, const std::string &device, double speed,
+                   const TimeSpan &interval)
+    : speed_(speed) {
   std::vector<std::string> devices = {device};
   if (device.empty()) {
     auto all = fingertips_in(path);
     devices = all.empty() ? devices : all;
     if (all.size() == 2) {
-      grip_track_.emplace(GripRowReader(path, salvage));
+      grip_track_.emplace(GripRowReader(path, salvage, interval));
     }
   }
   for (const std::string &each : devices) {
-    tracks_.emplace_back(PacketFile(path, salvage, each));
+    tracks_.emplace_back(PacketFile(path, salvage, each, interval));
     Model model;
     model.set_state(Model::State::replay);
     model.set_source(path);

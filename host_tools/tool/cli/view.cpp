@@ -177,7 +177,7 @@ private:
   bool in_place_ = isatty(STDERR_FILENO);
   bool shown_ = false;
   Change change_;
-  Interval interval_{std::chrono::milliseconds(in_place_ ? 200 : 1000)};
+  Interval interval_{std::chrono::milliseconds(in_place_ ? 200 : 10000)};
 };
 
 class StateView : public View {

@@ -13,11 +13,13 @@
 #include "tool/cli/playback.hpp"
 #include "tool/cli/view.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <unistd.h>
 
 namespace fingertip {
 
@@ -28,9 +30,47 @@ struct Conversion {
   std::string device; /* of several in the file; empty: all, or the only one */
   bool salvage = false;
   bool overwrite = false;
+  TimeSpan interval;
 };
 
 using Count = unsigned long long;
+
+/* The share of a file that was read, and the time that is left: from the third second on, in place on a terminal, else
+ * a line every ten seconds. */
+class Progress {
+public:
+  explicit Progress(const std::string &path) : size_(static_cast<double>(open_bytes(path)->size())) {}
+  ~Progress() { std::fputs(in_place_ && shown_ != begun_ ? "\r\x1b[K" : "", stderr); }
+  Progress(const Progress &) = delete;
+  Progress &operator=(const Progress &) = delete;
+
+  /* place: of the file, asked for now and then. */
+  template <typename Place> void show(const Place &place) {
+    constexpr unsigned AT_ONCE = 4096;
+    const HostTime now = host_now();
+    if (count_++ % AT_ONCE != 0 || now - begun_ < std::chrono::seconds(2) ||
+        now - shown_ < std::chrono::milliseconds(in_place_ ? 200 : 10000)) {
+      return;
+    }
+    shown_ = now;
+    const double share = static_cast<double>(place().offset) / size_;
+    const double left_s = std::chrono::duration<double>(now - begun_).count() * (1 / std::max(share, 1e-3) - 1);
+    std::fprintf(stderr, in_place_ ? "\r\x1b[K%.0f %%, %.0f s left" : "%.0f %%, %.0f s left\n", 100 * share, left_s);
+  }
+  void show(PacketFile &file) {
+    show([&] {
+      const auto place = file.place();
+      return place.in_recording ? place.in_recording->in_file
+                                : LineSource::Place{static_cast<std::streamoff>(place.state.offset)};
+    });
+  }
+
+private:
+  double size_;
+  bool in_place_ = isatty(STDERR_FILENO);
+  unsigned count_ = 0;
+  HostTime begun_ = host_now(), shown_ = begun_;
+};
 
 /* That a recording has a place for. */
 bool is_kept(const wire_packet &packet) {
@@ -55,9 +95,11 @@ struct Contents {
 };
 
 Contents contents_of(const Conversion &conversion) {
-  PacketFile file(conversion.from, conversion.salvage, conversion.device);
+  PacketFile file(conversion.from, conversion.salvage, conversion.device, conversion.interval);
   Contents contents;
+  Progress progress(conversion.from);
   while (auto item = file.next()) {
+    progress.show(file);
     if (item->kind != PacketFile::Item::Kind::packet || item->made) {
       if (item->made && !contents.info) {
         contents.info = item->packet.body.info;
@@ -111,8 +153,10 @@ void convert_packets(const Conversion &conversion) {
                          contents.info ? &*contents.info : nullptr,
                          contents.sensor_count.value_or(contents.info ? contents.info->sensor_count : std::uint8_t{0}),
                          metadata, contents.sensor_count.has_value());
-  PacketFile file(conversion.from, conversion.salvage, conversion.device);
+  PacketFile file(conversion.from, conversion.salvage, conversion.device, conversion.interval);
+  Progress progress(conversion.from);
   while (auto item = file.next()) {
+    progress.show(file);
     if (item->kind == PacketFile::Item::Kind::packet && !item->made) {
       writer.packet(item->packet);
     } else if (item->kind == PacketFile::Item::Kind::event) {
@@ -133,9 +177,10 @@ void convert_packets(const Conversion &conversion) {
 void convert_lines(const Conversion &conversion) {
   check_paths(conversion);
   RecordingReader(conversion.from, true); /* throws for what is none */
-  auto source = open_lines(conversion.from);
+  auto source = within(open_lines(conversion.from), conversion.interval);
   auto sink = make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished);
   LineSource::Line line;
+  Progress progress(conversion.from);
   std::uint64_t last = 0, count = 0;
   bool is_ended = false;
   const auto report_damage = [&](const std::string &what, const std::string &place = "") {
@@ -156,12 +201,13 @@ void convert_lines(const Conversion &conversion) {
       std::fprintf(stderr, "%s\n", printable(error.what()).c_str());
       continue;
     }
-    if (line.number > last + 1) {
-      report_damage(std::to_string(line.number - last - 1) + " lines are lost before line " +
+    if (line.number > last + 1 + line.left_out) {
+      report_damage(std::to_string(line.number - last - 1 - line.left_out) + " lines are lost before line " +
                     std::to_string(line.number));
     }
     last = line.number;
     count++;
+    progress.show([&] { return source->place(); });
     is_ended = is_ended || (!line.torn && line.text.rfind("# end:", 0) == 0);
     if (line.torn) {
       report_damage("the last line is torn", ":" + std::to_string(line.number));
@@ -183,7 +229,7 @@ void convert_to_capture(const Conversion &conversion) {
   check_paths(conversion);
   contents_of(conversion); /* throws before anything is written */
   OutputFile capture(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished);
-  PacketFile file(conversion.from, conversion.salvage, conversion.device);
+  PacketFile file(conversion.from, conversion.salvage, conversion.device, conversion.interval);
   std::uint64_t packets = 0;
   while (auto item = file.next()) {
     if (item->kind == PacketFile::Item::Kind::packet) {
@@ -223,7 +269,24 @@ struct ReplayOptions {
   std::string to_csv; /* empty: show it */
   bool overwrite = false;
   ColourMode colour = ColourMode::automatic;
+  TimeSpan interval;
 };
+
+/* --from and --to. */
+void with_time_span(CLI::App *command, TimeSpan &interval) {
+  const auto seconds = [command](const char *name, double &to, const char *help) {
+    const auto set = [name, &to](const std::string &text) {
+      const auto s = to_double(text);
+      if (!s || *s < 0) {
+        wrong_value(name, text, "seconds since the recording began, 0 or more");
+      }
+      to = *s;
+    };
+    command->add_option_function<std::string>(name, set, help)->type_name("S");
+  };
+  seconds("--from", interval.from_s, "Leave out what is before, in seconds since the recording began");
+  seconds("--to", interval.to_s, "Leave out what is after");
+}
 
 double speed_from_text(const std::string &text) {
   if (text == "max") {
@@ -237,7 +300,7 @@ double speed_from_text(const std::string &text) {
 }
 
 int show(const ReplayOptions &options) {
-  Playback playback(options.file, options.salvage, options.device, options.speed);
+  Playback playback(options.file, options.salvage, options.device, options.speed, options.interval);
   std::string name = printable(options.file);
   std::unique_ptr<View> view =
       playback.grip() ? make_grasp_view(options.colour, *playback.grip()) : make_monitor_view(options.colour);
@@ -274,7 +337,8 @@ void add_replay(CommandLine &line) {
     if (options->to_csv.empty()) {
       return show(*options);
     }
-    convert_packets({options->file, options->to_csv, options->device, options->salvage, options->overwrite});
+    convert_packets(
+        {options->file, options->to_csv, options->device, options->salvage, options->overwrite, options->interval});
     return 0;
   });
   with_value(command, "FILE", "file", options->file, "Recording (.csv, .mcap) or bytes of the line (.ftr)")->required();
@@ -288,6 +352,7 @@ void add_replay(CommandLine &line) {
   command->add_flag("--salvage", options->salvage, "Skip damaged lines and count them");
   with_value(command, "OUT.csv", "--to-csv", options->to_csv, "Write a recording instead of showing it");
   command->add_flag("--overwrite", options->overwrite, "Replace OUT.csv if it exists");
+  with_time_span(command, options->interval);
   with_colour(command, options->colour);
 }
 
@@ -302,6 +367,7 @@ void add_convert(CommandLine &line) {
              "Serial number of one of several fingertips in the recording; only this one");
   command->add_flag("--salvage", options->salvage, "Read what is readable of a damaged file, and report the rest");
   command->add_flag("--overwrite", options->overwrite, "Replace OUT if it exists");
+  with_time_span(command, options->interval);
 }
 
 } // namespace fingertip
