@@ -31,7 +31,7 @@ GripperTraits traits_of(const fingertip_grip_traits &given) {
 
 GripSettings settings_of(const GripperTraits &traits, const char *const *names, const double *values, size_t count) {
   std::map<std::string, double> wanted;
-  for (std::size_t i = 0; i < count; i++) {
+  for (std::size_t i = 0; i < count && names && values; i++) {
     const GraspSetting &setting = setting_of_field(names[i]);
     wanted[setting.name] = values[i] / setting.scale;
   }
@@ -63,6 +63,9 @@ struct fingertip_grip *fingertip_grip_new(const struct fingertip_grip_traits *tr
                                           const double *values, size_t count) {
   fingertip_grip *made = nullptr;
   guarded([&] {
+    if (!traits) {
+      return null();
+    }
     const GripperTraits own = traits_of(*traits);
     const GripSettings settings = settings_of(own, names, values, count);
     made = new fingertip_grip{own, settings, Grip(settings, own)};
@@ -76,6 +79,9 @@ void fingertip_grip_free(struct fingertip_grip *grip) { delete grip; }
 enum fingertip_status fingertip_grip_set(struct fingertip_grip *grip, const char *const *names, const double *values,
                                          size_t count) {
   return guarded([&] {
+    if (!grip) {
+      return null();
+    }
     const GripSettings settings = settings_of(grip->traits, names, values, count);
     if (!grip->grip.change(settings)) {
       return failed(FINGERTIP_ERR_VALUE, "the mode cannot change: set_N chooses it at the beginning");
@@ -87,6 +93,9 @@ enum fingertip_status fingertip_grip_set(struct fingertip_grip *grip, const char
 
 enum fingertip_status fingertip_grip_setting(const struct fingertip_grip *grip, const char *name, double *value) {
   return guarded([&] {
+    if (!grip || !name || !value) {
+      return null();
+    }
     GripSettings settings = grip->settings;
     *value = setting_of_field(name).field(settings);
     return FINGERTIP_OK;

@@ -2,8 +2,9 @@
 // `truth` in the folder of the simulated ports. Where a hand is obeyed, its name `hand` leads there
 // too. `fingertip web` is its client (web/server/simulations.hpp). Lines of text:
 //
-//   press SIDE X_mm Y_mm FORCE_N        SIDE: left or right; 0 to 50 N. So it stays until another
-//   line lift SIDE truth SIDE T_us X_mm Y_mm FORCE_N QX_N QY_N
+//   press SIDE X_mm Y_mm FORCE_N        SIDE: left or right; 0 to 50 N. So it stays until another line
+//   lift SIDE
+//   truth SIDE T_us X_mm Y_mm FORCE_N QX_N QY_N
 //                                       to every client each 20 ms; T_us: in the fingertip's own
 //                                       time, as in its packets; FORCE_N 0: no contact; QX_N, QY_N:
 //                                       the pull along the rubber

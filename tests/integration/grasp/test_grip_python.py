@@ -3,6 +3,7 @@
 usage: test_grip_python.py SIMULATED_FINGERTIP FAKE_CELL TIME_KEEPER GRIP_TABLE FINGERTIP TABLES [unittest arguments]; FINGERTIP_LIBRARY
 """
 
+import dataclasses
 import itertools
 import os
 import pathlib
@@ -15,8 +16,7 @@ import unittest
 
 import numpy as np
 
-PROGRAMS = [os.path.abspath(path) for path in sys.argv[1:7]]
-SIMULATED, FAKE_CELL, TIME_KEEPER, GRIP_TABLE, FINGERTIP, TABLES = PROGRAMS
+SIMULATED, FAKE_CELL, TIME_KEEPER, GRIP_TABLE, FINGERTIP, TABLES = (os.path.abspath(path) for path in sys.argv[1:7])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import BadValueError, files, grip  # noqa: E402
@@ -36,6 +36,9 @@ class Names(unittest.TestCase):
     def test_settings(self):
         made = grip.Grip(TRAITS, grip.Settings(mass_kg=0.5))
         self.assertEqual((made.setting("mass_kg"), made.setting("cap_N")), (0.5, 21.0))
+        for field in dataclasses.fields(grip.Settings):
+            self.assertGreaterEqual(made.setting(field.name), 0)
+        self.assertRaisesRegex(BadValueError, "no setting grip_N", made.setting, "grip_N")
         made.set(grip.Settings(cap_N=30))
         self.assertEqual((made.setting("mass_kg"), made.setting("cap_N")), (0.0, 30.0))
         self.assertRaisesRegex(BadValueError, "cap_N is not possible; give 0.5 to 100 N", made.set, grip.Settings(cap_N=200))

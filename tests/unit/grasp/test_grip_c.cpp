@@ -29,17 +29,6 @@ namespace {
 
 const fingertip_grip_traits TRAITS = {85, 0.1, 0, 1, 150, 1, 100, 0.008, 0.002};
 const GripperTraits SAME = {"gripper", 85, 0.1, 0, 1, 150, 1, 100, 0.008, 0.002};
-using Handle = std::unique_ptr<fingertip_grip, void (*)(fingertip_grip *)>;
-
-Handle grip_of(const std::map<std::string, double> &wanted) {
-  std::vector<const char *> names;
-  std::vector<double> values;
-  for (const auto &[name, value] : wanted) {
-    names.push_back(name.c_str());
-    values.push_back(value);
-  }
-  return {fingertip_grip_new(&TRAITS, names.data(), values.data(), names.size()), fingertip_grip_free};
-}
 
 wire_packet contact_at(double t_s, double force_N, double load_N) {
   wire_packet packet = {};
@@ -58,7 +47,10 @@ wire_packet contact_at(double t_s, double force_N, double load_N) {
 
 TEST(GripC, GivesTheCommandsOfTheClass) {
   Grip same(settings_for(SAME, {{"cap", 9}}), SAME);
-  const Handle grip = grip_of({{"cap_N", 9}});
+  const char *name = "cap_N";
+  const double cap_N = 9;
+  const std::unique_ptr<fingertip_grip, void (*)(fingertip_grip *)> grip(fingertip_grip_new(&TRAITS, &name, &cap_N, 1),
+                                                                         fingertip_grip_free);
   same.request(GRIP_REQUEST_GRASP);
   ASSERT_EQ(fingertip_grip_ask(grip.get(), GRIP_REQUEST_GRASP), FINGERTIP_OK);
   EXPECT_EQ(fingertip_grip_ask(grip.get(), GRIP_REQUEST_PLACE), FINGERTIP_END);
@@ -106,25 +98,4 @@ TEST(GripC, GivesTheCommandsOfTheClass) {
     EXPECT_TRUE(seen >> state & 1) << state_name(state);
   }
   EXPECT_GT(most_N, 2.0);
-}
-
-TEST(GripC, SettingsHaveTheNamesOfTheirFieldsAndChangeAsAWhole) {
-  const Handle grip = grip_of({{"mass_kg", 0.5}, {"stale_s", 0.02}});
-  double value = 0.0;
-  for (const GraspSetting &setting : grasp_settings()) {
-    GripSettings settings = settings_for(SAME, {{"mass", 0.5}, {"stale", 20}});
-    ASSERT_EQ(fingertip_grip_setting(grip.get(), field_name(setting).c_str(), &value), FINGERTIP_OK);
-    EXPECT_EQ(value, setting.field(settings)) << setting.name;
-  }
-  const char *names[] = {"cap_N", "stale_s"};
-  const double wrong[] = {8, 3}, right[] = {8, 0.03};
-  EXPECT_EQ(fingertip_grip_set(grip.get(), names, wrong, 2), FINGERTIP_ERR_VALUE);
-  EXPECT_NE(std::string(fingertip_error()).find("stale_s is not possible"), std::string::npos) << fingertip_error();
-  fingertip_grip_setting(grip.get(), "cap_N", &value);
-  EXPECT_EQ(value, 20.0);
-  EXPECT_EQ(fingertip_grip_set(grip.get(), names, right, 2), FINGERTIP_OK);
-  fingertip_grip_setting(grip.get(), "cap_N", &value);
-  EXPECT_EQ(value, 8.0);
-  EXPECT_EQ(grip_of({{"grip_N", 1}}), nullptr);
-  EXPECT_EQ(fingertip_grip_take_contact(grip.get(), 0, 1.0, &value, 1), FINGERTIP_ERR_ARGUMENT);
 }
