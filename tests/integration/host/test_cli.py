@@ -11,7 +11,6 @@ import numpy as np
 
 from cli_case import CliTest
 from fingertip import files
-import figures
 
 
 class Usage(CliTest):
@@ -194,10 +193,6 @@ class Several(CliTest):
         span_us = one["t_us"][-1] - one["t_us"][0]
         self.assertGreater(span_us, 1e6)
         self.assertGreater(len(errors[0]), 100e-6 * span_us)
-        if path := os.environ.get("FINGERTIP_REPORT"):
-            figures.add(
-                path, {"alignment_fake_devices_us": round(alignment_us, 1), "alignment_fake_devices_seconds": self.ALIGNMENT_SECONDS}
-            )
         self.assert_in_order()
         several = self.run_cli("replay", self.csv, "--to-csv", self.csv + "2", status=1)[1]
         self.assertIn("holds several fingertips: AAAA BBBB; choose one with --device SERIAL", several)
