@@ -10,8 +10,6 @@ using namespace fingertip::calibrating;
 using fingertip::Random;
 using test::KnownPad;
 
-namespace {
-
 constexpr int SENSORS = 15, SENSOR_UNKNOWNS = 6, // log gain, dx, dy, o, b, r
     PROFILE_UNKNOWNS = 9;
 
@@ -49,8 +47,8 @@ template <int SIZE> struct Prior {
 };
 
 template <int SIZE>
-void add_prior(ceres::Problem &problem, double *block, int at, double mean, double sd,
-               ceres::LossFunction *loss = nullptr) {
+static void add_prior(ceres::Problem &problem, double *block, int at, double mean, double sd,
+                      ceres::LossFunction *loss = nullptr) {
   problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Prior<SIZE>, 1, SIZE>(new Prior<SIZE>{at, mean, sd}), loss,
                            block);
 }
@@ -61,7 +59,8 @@ struct Found {
 };
 
 // With the spreads that the solver has learnt.
-Found by_ceres(const Array &array, const std::vector<Placement> &placements, const Solution &solution, Random &start) {
+static Found by_ceres(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
+                      Random &start) {
   const Assumptions assumed;
   double peak_Pa = 0.0, near_Pa = 0.0;
   {
@@ -142,8 +141,6 @@ Found by_ceres(const Array &array, const std::vector<Placement> &placements, con
   }
   return found;
 }
-
-} // namespace
 
 /* Ceres, which starts off the solution, may end in another minimum, and so may the solver. */
 TEST(Calibration, finds_the_minimum_that_ceres_finds) {

@@ -22,8 +22,6 @@ extern "C" {
 
 namespace reference = fingertip::reference;
 
-namespace {
-
 // A standard deviation of more than this share of the force is no observation of the pull.
 constexpr double OBSERVABLE = 0.1;
 constexpr int PRESSES = 2000;
@@ -31,12 +29,10 @@ constexpr int PRESSES = 2000;
 constexpr double MEDIAN_um = 0.15, P99_um = 1.5, PULL_P99 = 0.0003, FORCE_P99 = 0.0003;
 constexpr int MOST_ELSEWHERE = PRESSES / 500;
 
-double quantile(std::vector<double> values, double share) {
+static double quantile(std::vector<double> values, double share) {
   std::sort(values.begin(), values.end());
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
-
-} // namespace
 
 int main(int argc, char **argv) {
   const pad_profile profile = pad_of_12_mm();

@@ -5,16 +5,14 @@
 
 using namespace fingertip;
 
-namespace {
-
 // Without what a recording has elsewhere, or not at all: commands, raw packets of another number of
 // sensors, and how the firmware last ended, which only who asks is told.
-bool is_recorded(const wire_packet &packet, std::uint8_t sensors) {
+static bool is_recorded(const wire_packet &packet, std::uint8_t sensors) {
   return packet.type < WIRE_CMD_STREAM && packet.type != WIRE_CRASH &&
          (packet.type != WIRE_RAW || packet.body.raw.sensor_count == sensors);
 }
 
-void check_recording_of(const std::vector<fuzz::Item> &items, bool raw_expected) {
+static void check_recording_of(const std::vector<fuzz::Item> &items, bool raw_expected) {
   std::uint8_t sensors = 0;
   const wire_info *info = nullptr;
   for (const auto &item : items) {
@@ -44,8 +42,6 @@ void check_recording_of(const std::vector<fuzz::Item> &items, bool raw_expected)
     FUZZ_CHECK(fuzz::is_same(read[i], written[i]));
   }
 }
-
-} // namespace
 
 void fuzz_one(const uint8_t *bytes, size_t length) {
   fuzz_input input = {bytes, bytes + length};

@@ -8,11 +8,9 @@
 
 using namespace fingertip;
 
-namespace {
+static double draw(fuzz_input &input, double low, double high) { return low + (high - low) * fuzz_u8(&input) / 255.0; }
 
-double draw(fuzz_input &input, double low, double high) { return low + (high - low) * fuzz_u8(&input) / 255.0; }
-
-GripTouch draw_touch(fuzz_input &input, double now_s) {
+static GripTouch draw_touch(fuzz_input &input, double now_s) {
   GripTouch touch;
   touch.t_s = now_s - draw(input, -0.05, 0.5);
   touch.flags = fuzz_u32(&input) & 0x1ffffffu;
@@ -25,8 +23,6 @@ GripTouch draw_touch(fuzz_input &input, double now_s) {
   touch.speed_y_mm_s = draw(input, -300.0, 300.0);
   return touch;
 }
-
-} // namespace
 
 void fuzz_one(const uint8_t *bytes, size_t length) {
   fuzz_input input = {bytes, bytes + length};

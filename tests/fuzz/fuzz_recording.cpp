@@ -10,17 +10,15 @@
 
 using namespace fingertip;
 
-namespace {
-
 // A row that reads is written and read the same; the second time to the last digit.
-void check_row(const GripRow &row) {
+static void check_row(const GripRow &row) {
   const std::string cells = grip_cells(row);
   const GripRow again = grip_row("0," + cells);
   FUZZ_CHECK(grip_cells(again) == cells);
   FUZZ_CHECK(std::isfinite(row.time_us));
 }
 
-void read_rows(const std::string &path, bool salvage) {
+static void read_rows(const std::string &path, bool salvage) {
   try {
     GripRowReader reader(path, salvage);
     while (auto row = reader.next()) {
@@ -31,7 +29,7 @@ void read_rows(const std::string &path, bool salvage) {
   }
 }
 
-std::vector<std::string> lines_of(const std::string &path, bool salvage) {
+static std::vector<std::string> lines_of(const std::string &path, bool salvage) {
   std::vector<std::string> lines;
   const auto source = open_lines(path);
   LineSource::Line line;
@@ -50,7 +48,7 @@ std::vector<std::string> lines_of(const std::string &path, bool salvage) {
 }
 
 // The sink writes a file of its own name: a folder of this process, in memory where there is one.
-std::string written(const std::vector<std::string> &lines) {
+static std::string written(const std::vector<std::string> &lines) {
   static const std::string path = (std::filesystem::exists("/dev/shm") ? "/dev/shm/" : "/tmp/") +
                                   std::string("fuzz_mcap_") + std::to_string(getpid()) + ".mcap";
   const auto sink = make_lines(path, true, OutputFile::Appears::at_once);
@@ -62,7 +60,7 @@ std::string written(const std::vector<std::string> &lines) {
 }
 
 // Whatever lines are in an MCAP file, another holds the same.
-void check_lines(const std::string &path, bool salvage) {
+static void check_lines(const std::string &path, bool salvage) {
   std::vector<std::string> lines;
   std::string copy;
   try {
@@ -76,8 +74,6 @@ void check_lines(const std::string &path, bool salvage) {
   }
   std::filesystem::remove(copy);
 }
-
-} // namespace
 
 void fuzz_one(const uint8_t *bytes, size_t length) {
   fuzz_input input = {bytes, bytes + length};

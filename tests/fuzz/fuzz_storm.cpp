@@ -5,13 +5,11 @@
 
 using namespace storm;
 
-namespace {
-
 constexpr std::uint64_t SECOND_us = 1000000, STEADY_us = 6 * SECOND_us, CLOCK_WRAPS_us = 4294967296;
 // Of a location's own: one frame in sixty million is further off by noise alone.
 constexpr double STEADY_SDS = 6;
 
-void check(const Judge &judge) {
+static void check(const Judge &judge) {
   for (const Finding &finding : judge.findings()) {
     std::fprintf(stderr, "%s at %.3f s: %s\n", finding.kind.c_str(), 1e-6 * static_cast<double>(finding.t_us),
                  finding.text.c_str());
@@ -20,7 +18,7 @@ void check(const Judge &judge) {
 }
 
 // The highest rate and a pad's profile, while the clock's 32 bits of microseconds wrap: no frame is missing or late.
-void steady(std::uint64_t seed) {
+static void steady(std::uint64_t seed) {
   constexpr std::uint64_t clock_us = CLOCK_WRAPS_us - STEADY_us / 2;
   World world(seed);
   Judge judge(world);
@@ -32,8 +30,6 @@ void steady(std::uint64_t seed) {
   FUZZ_CHECK(judge.figures().frames > 1000 * (STEADY_us / SECOND_us - 3));
   FUZZ_CHECK(judge.figures().missing + judge.figures().skipped + judge.figures().late == 0);
 }
-
-} // namespace
 
 // The first byte is the seed, one of a few; the rest are faults, or none.
 void fuzz_one(const std::uint8_t *bytes, std::size_t length) {

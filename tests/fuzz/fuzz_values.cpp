@@ -10,10 +10,8 @@
 
 using namespace fingertip;
 
-namespace {
-
 // Refused, or values that the codec and the fingertip take.
-void check_setting(const std::string &text) {
+static void check_setting(const std::string &text) {
   const wire_info now = []() {
     wire_info info{};
     info.slip_threshold_mm = 1;
@@ -29,7 +27,7 @@ void check_setting(const std::string &text) {
   }
 }
 
-void check_text(const std::string &text) {
+static void check_text(const std::string &text) {
   for (const char *name : {"rate=", "osr=", "slip_threshold=", "slip_window=", "prior=", "limit=", "sync="}) {
     check_setting(name + text);
   }
@@ -54,7 +52,7 @@ void check_text(const std::string &text) {
   FUZZ_CHECK(joined == text);
 }
 
-void check_settings(fuzz_input &input) {
+static void check_settings(fuzz_input &input) {
   const auto models = gripper_models();
   const GripperTraits &traits = models[fuzz_u8(&input) % models.size()];
   std::map<std::string, double> wanted;
@@ -81,8 +79,6 @@ void check_settings(fuzz_input &input) {
     FUZZ_CHECK(error.code() == ErrorCode::bad_value);
   }
 }
-
-} // namespace
 
 void fuzz_one(const uint8_t *bytes, size_t length) {
   fuzz_input input = {bytes, bytes + length};

@@ -21,11 +21,9 @@
 #include <string>
 #include <vector>
 
-namespace {
-
 using namespace fingertip;
 
-double number(const std::string &text) {
+static double number(const std::string &text) {
   const auto value = to_double(text);
   if (!value) {
     throw Error("\"" + text + "\" must be a number");
@@ -33,12 +31,12 @@ double number(const std::string &text) {
   return *value;
 }
 
-wire_packet pad_of(const std::string &thickness, const std::string &overhang, bool from_touch) {
+static wire_packet pad_of(const std::string &thickness, const std::string &overhang, bool from_touch) {
   return command_pad(pad::profile_over_own_sensors({number(thickness), number(overhang), from_touch}));
 }
 
 /* Of fifteen sensors that are alike. */
-wire_packet calibration_of(const std::string &sigma, const std::string &dip) {
+static wire_packet calibration_of(const std::string &sigma, const std::string &dip) {
   constexpr std::uint8_t SENSORS = 15;
   const double sigma_mm = number(sigma);
   calibration made{};
@@ -55,7 +53,7 @@ wire_packet calibration_of(const std::string &sigma, const std::string &dip) {
   return command_calibrate(made, SENSORS);
 }
 
-std::uint8_t streams_of(const std::string &text) {
+static std::uint8_t streams_of(const std::string &text) {
   for (std::uint8_t streams = 0; streams <= WIRE_STREAM_ALL; streams++) {
     if (streams_text(streams) == text) {
       return streams;
@@ -65,7 +63,7 @@ std::uint8_t streams_of(const std::string &text) {
 }
 
 /* Of settings that travel in one command. */
-wire_packet command_of(std::initializer_list<std::string> texts) {
+static wire_packet command_of(std::initializer_list<std::string> texts) {
   std::vector<WantedSetting> wanted;
   for (const std::string &text : texts) {
     wanted.push_back(setting_from_text(text));
@@ -73,7 +71,7 @@ wire_packet command_of(std::initializer_list<std::string> texts) {
   return setting_commands(wanted, {})[0];
 }
 
-wire_packet packet_from_words(const std::vector<std::string> &words) {
+static wire_packet packet_from_words(const std::vector<std::string> &words) {
   struct Form {
     std::size_t arguments;
     std::function<wire_packet()> make;
@@ -109,8 +107,6 @@ wire_packet packet_from_words(const std::vector<std::string> &words) {
   }
   return form->second.make();
 }
-
-} // namespace
 
 int main(int argc, char **argv) {
   try {

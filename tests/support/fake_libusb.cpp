@@ -9,19 +9,15 @@
 
 namespace fake_libusb {
 
-namespace {
+static std::vector<std::shared_ptr<Device>> devices;
+static int balance = 0;
+static std::string misused;
 
-std::vector<std::shared_ptr<Device>> devices;
-int balance = 0;
-std::string misused;
-
-void misuse_if(bool wrong, const char *how) {
+static void misuse_if(bool wrong, const char *how) {
   if (wrong && misused.empty()) {
     misused = how;
   }
 }
-
-} // namespace
 
 std::vector<std::shared_ptr<Device>> &bus() { return devices; }
 int leaks() { return balance; }
@@ -55,21 +51,17 @@ struct libusb_device_handle {
   std::shared_ptr<Device> fake;
 };
 
-namespace {
-
 /* libusb knows the context of a device; here only one is open at a time. */
-libusb_context *current = nullptr;
+static libusb_context *current = nullptr;
 
-bool is_waiting(const libusb_transfer *transfer) {
+static bool is_waiting(const libusb_transfer *transfer) {
   return current && std::find(current->waiting.begin(), current->waiting.end(), transfer) != current->waiting.end();
 }
 
-void complete(libusb_transfer *transfer, libusb_transfer_status status) {
+static void complete(libusb_transfer *transfer, libusb_transfer_status status) {
   transfer->status = status;
   transfer->callback(transfer);
 }
-
-} // namespace
 
 extern "C" {
 

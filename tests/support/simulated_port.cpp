@@ -19,19 +19,15 @@
 
 namespace fingertip {
 
-namespace {
-
-Error failure(const std::string &what) {
+static Error failure(const std::string &what) {
   return Error(ErrorCode::cannot_open, what + " (" + std::strerror(errno) + ")");
 }
 
-std::string own_name() {
+static std::string own_name() {
   static std::atomic<unsigned> number{0};
   const char *folder = std::getenv("TMPDIR");
   return std::string(folder ? folder : "/tmp") + "/port-" + std::to_string(getpid()) + "-" + std::to_string(number++);
 }
-
-} // namespace
 
 ServedPort::ServedPort(const std::string &link) : path_(link.empty() ? own_name() : link), link_(link), name_(path_) {
   unlink(path_.c_str());

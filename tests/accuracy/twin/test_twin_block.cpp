@@ -10,13 +10,12 @@
 #include <gtest/gtest.h>
 
 namespace fingertip::twin {
-namespace {
 
 const std::filesystem::path CACHE = FINGERTIP_TEST_CACHE_DIR;
 constexpr double FIELD_STEP_mm = 0.5;
 const BlockGrid COARSE{5, 8.0, 0.7, 0.04, 3.0};
 
-Block around(double thickness_mm, double overhang_mm) {
+static Block around(double thickness_mm, double overhang_mm) {
   return {silicone(thickness_mm), 9.0 + overhang_mm, 18.0 + overhang_mm};
 }
 
@@ -49,14 +48,14 @@ struct LayerField {
 };
 
 // Of a block's answer, Pa / N: x, y, down.
-Eigen::Vector3d node(const BlockAnswer &answer, int i, int j) {
+static Eigen::Vector3d node(const BlockAnswer &answer, int i, int j) {
   const std::size_t n = std::size_t(i * answer.nodes_y + j);
   return {static_cast<double>(answer.along_x[n]), static_cast<double>(answer.along_y[n]),
           static_cast<double>(answer.down[n])};
 }
 
 // A load spread as LayerField's on the block's surface.
-Eigen::Vector3d spread(const BlockAnswer &answer, const Block &block, const Place &load, double s_mm) {
+static Eigen::Vector3d spread(const BlockAnswer &answer, const Block &block, const Place &load, double s_mm) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double weights = 0.0;
   for (int i = 0; i < answer.nodes_x; i++) {
@@ -71,7 +70,7 @@ Eigen::Vector3d spread(const BlockAnswer &answer, const Block &block, const Plac
   return sum / weights;
 }
 
-double bell(double dx, double dy, double s_mm) {
+static double bell(double dx, double dy, double s_mm) {
   return std::exp(-0.5 * (dx * dx + dy * dy) / (s_mm * s_mm)) / (2.0 * M_PI * s_mm * s_mm);
 }
 
@@ -145,8 +144,8 @@ TEST(TwinBlock, AgreesWithElementsOfTwentyNodesUnderTheLoadItself) {
 }
 
 // Largest difference of the answers, and largest of the second, in parts of the layer's peaks.
-std::pair<double, double> off_and_size(const std::vector<BlockAnswer> &a, const std::vector<BlockAnswer> &b,
-                                       const Eigen::Vector3d &peak) {
+static std::pair<double, double> off_and_size(const std::vector<BlockAnswer> &a, const std::vector<BlockAnswer> &b,
+                                              const Eigen::Vector3d &peak) {
   double off = 0.0, size = 0.0;
   for (std::size_t n = 0; n < a.size(); n++) {
     for (int i = 0; i < a[n].nodes_x; i++) {
@@ -286,5 +285,4 @@ TEST(TwinBlock, TheTableIsTheSolution) {
   std::filesystem::remove_all(folder);
 }
 
-} // namespace
 } // namespace fingertip::twin

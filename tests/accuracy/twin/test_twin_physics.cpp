@@ -7,15 +7,14 @@
 #include <gtest/gtest.h>
 
 namespace fingertip::twin {
-namespace {
 
 const std::filesystem::path CACHE = FINGERTIP_TEST_CACHE_DIR;
 
-std::size_t at(const Grid &grid, int i, int j) {
+static std::size_t at(const Grid &grid, int i, int j) {
   return std::size_t(grid.nodes / 2 + i) * std::size_t(grid.nodes) + std::size_t(grid.nodes / 2 + j);
 }
 
-double sum(const std::vector<double> &values) {
+static double sum(const std::vector<double> &values) {
   double total = 0.0;
   for (double value : values) {
     total += value;
@@ -216,5 +215,4 @@ TEST(TwinTable, ADamagedFileIsSolvedAnew) {
   EXPECT_EQ(again.base_pressure_Pa(3, 2, 1), good);
 }
 
-} // namespace
 } // namespace fingertip::twin

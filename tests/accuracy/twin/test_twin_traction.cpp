@@ -10,7 +10,6 @@
 #include <tuple>
 
 namespace fingertip::twin {
-namespace {
 
 const std::filesystem::path CACHE = FINGERTIP_TEST_CACHE_DIR;
 
@@ -19,7 +18,7 @@ struct Pair {
   TractionTable traction;
 };
 
-const Pair &tables_of(const std::string &name, double thickness_mm) {
+static const Pair &tables_of(const std::string &name, double thickness_mm) {
   static std::map<std::pair<std::string, double>, Pair> known;
   const auto key = std::make_pair(name, thickness_mm);
   if (known.find(key) == known.end()) {
@@ -30,11 +29,11 @@ const Pair &tables_of(const std::string &name, double thickness_mm) {
   return known.at(key);
 }
 
-std::size_t at(const Grid &grid, int i, int j) {
+static std::size_t at(const Grid &grid, int i, int j) {
   return std::size_t(grid.nodes / 2 + i) * std::size_t(grid.nodes) + std::size_t(grid.nodes / 2 + j);
 }
 
-double largest(const std::vector<double> &field) {
+static double largest(const std::vector<double> &field) {
   double most = 0.0;
   for (double value : field) {
     most = std::max(most, std::abs(value));
@@ -42,7 +41,7 @@ double largest(const std::vector<double> &field) {
   return most;
 }
 
-std::vector<double> times(const std::vector<double> &field, double factor) {
+static std::vector<double> times(const std::vector<double> &field, double factor) {
   std::vector<double> product = field;
   for (double &value : product) {
     value *= factor;
@@ -51,7 +50,7 @@ std::vector<double> times(const std::vector<double> &field, double factor) {
 }
 
 // friction (p(F) - p(S)), as TractionTable has it.
-std::vector<double> stuck_within(const Contact &whole, const Contact &stuck, double friction) {
+static std::vector<double> stuck_within(const Contact &whole, const Contact &stuck, double friction) {
   std::vector<double> traction = times(whole.pressure_Pa, friction);
   for (std::size_t n = 0; n < traction.size(); n++) {
     traction[n] -= friction * stuck.pressure_Pa[n];
@@ -344,5 +343,4 @@ TEST(TwinTraction, MovesTheClosestGaussianByAShareOfTheThickness) {
   }
 }
 
-} // namespace
 } // namespace fingertip::twin

@@ -6,7 +6,6 @@
 #include <cstdio>
 
 namespace storm {
-namespace {
 
 constexpr std::uint32_t WARNINGS = 0x7FF00;
 // More are not kept.
@@ -21,7 +20,7 @@ constexpr std::uint64_t SENSED_FOR_us = 100000, MEMORY_us = 60000000;
 constexpr std::uint64_t RELEASED_FOR_us = 300000;
 constexpr double UPTIME_LAG_s = 2.5;
 
-__attribute__((format(printf, 1, 2))) std::string text(const char *format, ...) {
+static __attribute__((format(printf, 1, 2))) std::string text(const char *format, ...) {
   char out[400];
   va_list values;
   va_start(values, format);
@@ -30,11 +29,9 @@ __attribute__((format(printf, 1, 2))) std::string text(const char *format, ...) 
   return out;
 }
 
-template <typename T> unsigned long long number(T value) { return static_cast<unsigned long long>(value); }
+template <typename T> static unsigned long long number(T value) { return static_cast<unsigned long long>(value); }
 
-bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW; }
-
-} // namespace
+static bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CONTACT || packet.type == WIRE_RAW; }
 
 void Judge::find(const std::string &kind, std::uint64_t t_us, const std::string &what) {
   if (findings_.size() < KEPT) {

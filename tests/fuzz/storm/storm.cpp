@@ -8,7 +8,6 @@
 #include <cstdio>
 
 namespace storm {
-namespace {
 
 // A fault begins after the part of the world that is fixed already, so that a hand can be off the pad in time.
 constexpr std::uint64_t LEAD_us = AHEAD_us + 2 * STEP_us;
@@ -25,9 +24,9 @@ constexpr std::uint64_t EXCUSED_us = 5000000;
 // At a time.
 constexpr unsigned MOST_FAULTS = 5;
 
-bool inverts_bits(const std::string &kind) { return kind == "inverted_bits" || kind == "d2_corrupt"; }
+static bool inverts_bits(const std::string &kind) { return kind == "inverted_bits" || kind == "d2_corrupt"; }
 
-bool takes_power(const std::string &kind) { return kind == "power_cut" || kind == "chip_reset"; }
+static bool takes_power(const std::string &kind) { return kind == "power_cut" || kind == "chip_reset"; }
 
 // What is done to the line.
 constexpr Target ON_THE_LINE[] = {
@@ -36,11 +35,9 @@ constexpr Target ON_THE_LINE[] = {
     {"store_writes", 100000, 1500000},
 };
 
-wire_packet set(const std::string &text) {
+static wire_packet set(const std::string &text) {
   return fingertip::setting_commands({fingertip::setting_from_text(text)}, {})[0];
 }
-
-} // namespace
 
 Storm::Storm(NativePlant &plant, World &world, Judge &judge, std::uint64_t seed, fuzz_input input)
     : plant_(plant), world_(world), judge_(judge), input_(input), random_{seed * 2 + 0x5EED} {

@@ -9,7 +9,6 @@ extern "C" {
 #include <stdexcept>
 
 namespace storm {
-namespace {
 
 constexpr double PI = 3.14159265358979;
 constexpr double AMBIENT_Pa = 101325;
@@ -18,14 +17,12 @@ constexpr double MOULDED_Pa = 3000;
 constexpr double TEMPERATURE_degC = 25, TEMPERATURE_SWING_degC = 1.5, TEMPERATURE_PERIOD_s = 300;
 constexpr std::uint64_t KEPT_us = 120000000;
 
-double smooth(double share) {
+static double smooth(double share) {
   const double s = std::clamp(share, 0.0, 1.0);
   return s * s * (3 - 2 * s);
 }
 
-double mix(double a, double b, double share) { return a + (b - a) * share; }
-
-} // namespace
+static double mix(double a, double b, double share) { return a + (b - a) * share; }
 
 double Row::force_N() const { return 2 * PI * p0_Pa * sigma_mm * sigma_mm * 1e-6; }
 

@@ -11,8 +11,6 @@ using namespace fingertip;
 using std::chrono::milliseconds;
 using Kind = GraspNews::Kind;
 
-namespace {
-
 /* Two fingertips on ports and a gripper without a line, an object of 40 mm between. */
 class GraspLoopTest : public ::testing::Test {
 protected:
@@ -81,8 +79,6 @@ protected:
   GraspNews last_{Kind::step};
   int frames_ = 0;
 };
-
-} // namespace
 
 TEST_F(GraspLoopTest, InterruptsHoldAndThenOpenWithoutAnybodyTakingNews) {
   std::atomic<unsigned> interrupts{0};

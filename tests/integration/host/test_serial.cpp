@@ -11,8 +11,6 @@
 using namespace fingertip;
 using std::chrono::milliseconds;
 
-namespace {
-
 /* For what surely comes, on a busy computer too. */
 constexpr milliseconds PATIENCE{10000};
 
@@ -34,8 +32,6 @@ protected:
   int master_ = -1;
   std::string link_ = "/tmp/fingertip-test-tty-" + std::to_string(getpid());
 };
-
-} // namespace
 
 TEST_F(Terminal, EveryByteArrivesUnchangedBothWaysWithoutEcho) {
   SerialTransport transport(link_);

@@ -12,11 +12,9 @@ using test::good_session;
 using test::KnownPad;
 using State = Judgement::State;
 
-namespace {
-
 /* Of thirty placements, each made by `press` on pad and placements of this seed. */
-Judgement judged(std::uint64_t seed, const std::function<KnownPad::Press(Random &random, int i)> &press,
-                 const std::function<void(Placement &placement, int i)> &change = {}, std::size_t count = 30) {
+static Judgement judged(std::uint64_t seed, const std::function<KnownPad::Press(Random &random, int i)> &press,
+                        const std::function<void(Placement &placement, int i)> &change = {}, std::size_t count = 30) {
   const KnownPad pad(seed);
   Random random(seed, 5, 0);
   std::vector<Placement> placements;
@@ -29,37 +27,35 @@ Judgement judged(std::uint64_t seed, const std::function<KnownPad::Press(Random 
   return judge(pad.array, placements, true);
 }
 
-KnownPad::Press within(Random &random, double x_mm, double low_mm, double high_mm) {
+static KnownPad::Press within(Random &random, double x_mm, double low_mm, double high_mm) {
   const double x = random.uniform(-x_mm, x_mm);
   return {x, random.uniform(low_mm, high_mm)};
 }
 
-KnownPad::Press anywhere(Random &random, int = 0) { return within(random, 9.0, -18.0, 18.0); }
+static KnownPad::Press anywhere(Random &random, int = 0) { return within(random, 9.0, -18.0, 18.0); }
 
-KnownPad::Press lying(Random &random, double axes) {
+static KnownPad::Press lying(Random &random, double axes) {
   KnownPad::Press press = anywhere(random);
   press.axes = axes;
   press.slant = random.uniform(0.0, M_PI);
   return press;
 }
 
-void alternate(Placement &placement, double off_Pa) {
+static void alternate(Placement &placement, double off_Pa) {
   for (std::size_t k = 0; k < 15; k++) {
     placement.reading_Pa[k] += k % 2 ? off_Pa : -off_Pa;
   }
 }
 
-double rms(const std::vector<double> &values) {
+static double rms(const std::vector<double> &values) {
   return std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0) / double(values.size()));
 }
 
-void expect_refused(const Judgement &judgement, Reason reason, const std::string &words) {
+static void expect_refused(const Judgement &judgement, Reason reason, const std::string &words) {
   EXPECT_EQ(judgement.state, State::refused) << judgement.text;
   EXPECT_STREQ(name_of(judgement.reason), name_of(reason)) << judgement.text;
   EXPECT_NE(judgement.text.find(words), std::string::npos) << judgement.text;
 }
-
-} // namespace
 
 TEST(Judge, accepts_good_sessions) {
   for (std::uint64_t seed = 40; seed < 60; seed++) {

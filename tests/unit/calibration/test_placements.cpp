@@ -10,8 +10,6 @@ using fingertip::Random;
 using test::KnownPad;
 using State = PlacementFinder::State;
 
-namespace {
-
 constexpr double AMBIENT_Pa = 101325.0;
 
 /* A stretch of time: what the sensors feel at its times. */
@@ -75,8 +73,6 @@ struct Feed {
   double rate_Hz, noise_Pa, t_s = 10.0, drift_Pa_s = 0.0, zero_off_Pa = 0.0;
   std::uint32_t valid = 0x7FFF;
 };
-
-} // namespace
 
 TEST(Placements, are_found_at_any_rate_and_noise) {
   for (const auto &[rate_Hz, noise_Pa] :

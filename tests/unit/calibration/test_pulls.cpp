@@ -7,8 +7,6 @@
 
 using namespace fingertip::calibrating;
 
-namespace {
-
 constexpr double KNOWN_N = 0.9, FORCE_N = 3.0, RATE_Hz = 50.0;
 
 /* One object after another, frame by frame. */
@@ -68,7 +66,7 @@ private:
 };
 
 /* So many pulls in turn towards +x, +y, -x, -y, each reading this share of what is known. */
-std::vector<Pull> pulls_that_read(std::size_t count, double (*reading)(std::size_t)) {
+static std::vector<Pull> pulls_that_read(std::size_t count, double (*reading)(std::size_t)) {
   std::vector<Pull> pulls;
   for (std::size_t i = 0; i < count; i++) {
     const double angle_rad = M_PI_2 * static_cast<double>(i % 4), size_N = reading(i) * KNOWN_N;
@@ -79,8 +77,6 @@ std::vector<Pull> pulls_that_read(std::size_t count, double (*reading)(std::size
   }
   return pulls;
 }
-
-} // namespace
 
 TEST(PullFinder, TakesWhatChangedFromRestToPull) {
   Bench bench;

@@ -11,9 +11,7 @@ using fingertip::Random;
 using test::good_session;
 using test::KnownPad;
 
-namespace {
-
-double rms_error(const std::vector<double> &gain, const std::vector<double> &truth) {
+static double rms_error(const std::vector<double> &gain, const std::vector<double> &truth) {
   double sum = 0.0;
   for (std::size_t k = 0; k < truth.size(); k++) {
     sum += std::pow(std::log(gain[k] / truth[k]), 2);
@@ -21,10 +19,10 @@ double rms_error(const std::vector<double> &gain, const std::vector<double> &tru
   return std::sqrt(sum / static_cast<double>(truth.size()));
 }
 
-double bell(double r_mm, double sd_mm) { return std::exp(-r_mm * r_mm / (2.0 * sd_mm * sd_mm)); }
+static double bell(double r_mm, double sd_mm) { return std::exp(-r_mm * r_mm / (2.0 * sd_mm * sd_mm)); }
 
 /* Presses of one foot whose response over the distance is this, of its peak. */
-template <typename Response> Solution solve_presses(const KnownPad &pad, Response response) {
+template <typename Response> static Solution solve_presses(const KnownPad &pad, Response response) {
   auto placements = good_session(pad, 24, 6);
   Random random(6, 2, 0);
   for (Placement &placement : placements) {
@@ -38,7 +36,7 @@ template <typename Response> Solution solve_presses(const KnownPad &pad, Respons
   return solve(pad.array, placements);
 }
 
-double layer(double r_mm, double wide_mm) {
+static double layer(double r_mm, double wide_mm) {
   return (1.0 - LAYER_MIXING) * bell(r_mm, wide_mm) + LAYER_MIXING * bell(r_mm, NARROW * wide_mm);
 }
 
@@ -58,8 +56,6 @@ struct Honesty {
     EXPECT_GT(within_two / all, 0.92);
   }
 };
-
-} // namespace
 
 TEST(Solver, finds_gains_places_and_the_profile) {
   const KnownPad pad(3);

@@ -5,12 +5,10 @@
 #include <gtest/gtest.h>
 #include <stdexcept>
 
-namespace {
-
 using namespace fingertip::cell;
 
 // On rubber that does not relax, of an object that does not move along the pads by itself.
-KindOfGrasp held(Shape shape, double mass_kg, double friction) {
+static KindOfGrasp held(Shape shape, double mass_kg, double friction) {
   KindOfGrasp grasp;
   grasp.shape = shape;
   grasp.mass_kg = mass_kg;
@@ -24,21 +22,21 @@ KindOfGrasp held(Shape shape, double mass_kg, double friction) {
 }
 
 // That squeezes with this force.
-double width_mm(const KindOfGrasp &grasp, double force_N) {
+static double width_mm(const KindOfGrasp &grasp, double force_N) {
   const double each_mm =
       std::pow(force_N / grasp.pads[0].at_1_mm_N, 1.0 / grasp.exponent) + 0.5 * force_N / Cell::FINGERS_N_mm;
   return grasp.width_mm - 2.0 * each_mm;
 }
 
 using Inputs = KindOfGrasp::Inputs;
-Inputs standing(const KindOfGrasp &grasp) {
+static Inputs standing(const KindOfGrasp &grasp) {
   Inputs inputs;
   inputs.mass_kg = grasp.mass_kg;
   return inputs;
 }
 
 // Squeezed on the table for 0.5 s, and then as asked for.
-void run(
+static void run(
     Cell &cell, const KindOfGrasp &grasp, double width_mm, double seconds,
     const std::function<void(double, Inputs &)> &then = [](double, Inputs &now) { now.table = false; }) {
   for (double t_s = -0.5; t_s < seconds; t_s += Cell::STEP_s) {
@@ -196,5 +194,3 @@ TEST(Cell, AWeightBesideTheAxisTurnsABallAndLessABox) {
   EXPECT_GT(std::abs(turned[0]), 0.5);
   EXPECT_LT(std::abs(turned[1]), 0.1);
 }
-
-} // namespace

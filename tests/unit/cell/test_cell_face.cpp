@@ -10,8 +10,6 @@ extern "C" {
 #include <cmath>
 #include <gtest/gtest.h>
 
-namespace {
-
 using namespace fingertip;
 using namespace fingertip::cell;
 
@@ -104,5 +102,3 @@ TEST(Face, AnAreaIsHeldInByItsOwnWidth) {
   }
   EXPECT_LT(most_Pa, 0.3 * pressed[7]); // the pull of an area hardly reaches them
 }
-
-} // namespace

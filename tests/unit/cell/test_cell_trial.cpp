@@ -11,8 +11,6 @@ extern "C" {
 #include <gtest/gtest.h>
 #include <set>
 
-namespace {
-
 using namespace fingertip;
 using namespace fingertip::cell;
 
@@ -72,7 +70,7 @@ TEST(Kinds, AreDrawnOverShapes) {
 }
 
 // A smooth lift of an object at rest, on rubber that does not relax.
-KindTrial calm(double mass_kg) {
+static KindTrial calm(double mass_kg) {
   KindTrial trial;
   trial.grasp.mass_kg = mass_kg;
   trial.grasp.lift_mm = 5.0;
@@ -86,7 +84,7 @@ KindTrial calm(double mass_kg) {
   return trial;
 }
 
-double width_mm(const KindTrial &trial, double force_N) {
+static double width_mm(const KindTrial &trial, double force_N) {
   const KindOfGrasp &grasp = trial.grasp;
   const double each_mm = std::pow(force_N / grasp.pads[0].at_1_mm_N, 1.0 / grasp.exponent);
   return grasp.width_mm - 2.0 * each_mm - force_N / Cell::FINGERS_N_mm;
@@ -180,7 +178,7 @@ TEST(Trial, AStillGraspShowsHowItSettles) {
 }
 
 // Begins at 1.6 s: a tenth of a second after HOLDING.
-KindTrial failing(Fault::Kind kind, bool left = false) {
+static KindTrial failing(Fault::Kind kind, bool left = false) {
   KindTrial one = calm(0.1);
   Fault fault;
   fault.kind = kind;
@@ -248,5 +246,3 @@ TEST(TrialFault, TheLineFailsFromThenOn) {
     }
   }
 }
-
-} // namespace

@@ -5,12 +5,10 @@
 #include <elf.h>
 #include <gtest/gtest.h>
 
-namespace {
-
 using namespace fingertip;
 
 /* An ELF file with two functions: fit_frame of 0x20 bytes at 0x20001000, and a label at 0x20001100 without a size. */
-std::vector<std::uint8_t> small_elf() {
+static std::vector<std::uint8_t> small_elf() {
   const char names[] = "\0fit_frame\0label\0data";
   Elf32_Sym symbols[4] = {};
   symbols[1] = {1, 0x20001001, 0x20, ELF32_ST_INFO(STB_LOCAL, STT_FUNC), 0, 1};
@@ -44,7 +42,7 @@ std::vector<std::uint8_t> small_elf() {
   return file;
 }
 
-crash_record record_of(unsigned kind) {
+static crash_record record_of(unsigned kind) {
   crash_record record = test::make_crash(0, 0).body.crash;
   record.kind = static_cast<std::uint8_t>(kind);
   return record;
@@ -136,5 +134,3 @@ TEST(Crash, EventsAndRegisters) {
   EXPECT_EQ(events_text(record), "");
   EXPECT_EQ(registers_text(record), "");
 }
-
-} // namespace

@@ -4,19 +4,17 @@
 
 #include <gtest/gtest.h>
 
-namespace {
-
 using namespace fingertip;
 
 constexpr unsigned SENSORS = 15;
 
-void set_board(Facts &facts, const char *board) {
+static void set_board(Facts &facts, const char *board) {
   std::memset(facts.info->board, 0, sizeof facts.info->board);
   std::strcpy(facts.info->board, board);
 }
 
 /* A fingertip with which all is well, at rest for ten seconds. */
-Facts good(const char *board = "pico_mux") {
+static Facts good(const char *board = "pico_mux") {
   Facts facts;
   facts.tool_version = {1, 20, 3};
   facts.rule = "/etc/udev/rules.d/60-fingertip.rules";
@@ -51,7 +49,7 @@ Facts good(const char *board = "pico_mux") {
   return facts;
 }
 
-std::vector<Finding> wrong(const Facts &facts) {
+static std::vector<Finding> wrong(const Facts &facts) {
   std::vector<Finding> findings;
   for (const Finding &finding : judge(facts)) {
     EXPECT_EQ(finding.verdict == Verdict::ok, finding.advice.empty()) << finding.text;
@@ -64,7 +62,7 @@ std::vector<Finding> wrong(const Facts &facts) {
 }
 
 /* The only thing that is wrong. */
-Finding only(const Facts &facts, Verdict verdict, const std::string &check) {
+static Finding only(const Facts &facts, Verdict verdict, const std::string &check) {
   auto findings = wrong(facts);
   std::string all;
   for (const Finding &finding : findings) {
@@ -80,9 +78,9 @@ Finding only(const Facts &facts, Verdict verdict, const std::string &check) {
   return findings[0];
 }
 
-bool contains(const std::string &text, const std::string &part) { return text.find(part) != std::string::npos; }
+static bool contains(const std::string &text, const std::string &part) { return text.find(part) != std::string::npos; }
 
-void fail(Facts &facts, ErrorCode code) {
+static void fail(Facts &facts, ErrorCode code) {
   facts.failure = Failure{code, "/dev/ttyACM0: ..."};
   facts.info.reset();
   facts.before.reset();
@@ -90,22 +88,22 @@ void fail(Facts &facts, ErrorCode code) {
   facts.rest.reset();
 }
 
-void set_rate(Facts &facts, double share) {
+static void set_rate(Facts &facts, double share) {
   facts.rest->frames_made = static_cast<std::uint32_t>(*expected_rate_Hz(*facts.info) * 10 * share);
 }
 
-void scale_pressures(Facts &facts, double factor) {
+static void scale_pressures(Facts &facts, double factor) {
   for (SensorAtRest &sensor : facts.rest->sensors) {
     sensor.mean_Pa *= factor;
     sensor.saturated_share = factor > 10 ? 1 : 0;
   }
 }
 
-void miss(Facts &facts, std::uint32_t sensors) { facts.after->sensors_present &= ~sensors; }
+static void miss(Facts &facts, std::uint32_t sensors) { facts.after->sensors_present &= ~sensors; }
 
-void hold(Facts &facts) { facts.holders.seen.push_back({123, "screen"}); }
+static void hold(Facts &facts) { facts.holders.seen.push_back({123, "screen"}); }
 
-void drift(Facts &facts, double Pa_per_s, double sd_Pa_per_s) {
+static void drift(Facts &facts, double Pa_per_s, double sd_Pa_per_s) {
   facts.rest->sensors[5].drift = Slope{Pa_per_s, sd_Pa_per_s};
 }
 
@@ -233,7 +231,7 @@ const Case CASES[] = {
 };
 
 /* What makes no finding. */
-void (*const FINE[])(Facts &) = {
+static void (*const FINE[])(Facts &) = {
     [](Facts &) {},
     [](Facts &f) {
       set_board(f, "pico_parallel");
@@ -261,8 +259,6 @@ void (*const FINE[])(Facts &) = {
     },
     [](Facts &f) { f.before->bus_nacks = f.after->bus_nacks = 100; }, /* long ago */
 };
-
-} // namespace
 
 TEST(Judge, EachFaultIsNamedWithWhatToDo) {
   for (const Case &each : CASES) {

@@ -6,8 +6,6 @@
 #include <gtest/gtest.h>
 #include <random>
 
-namespace {
-
 using fingertip::Rest;
 using fingertip::RestMeter;
 
@@ -24,7 +22,7 @@ struct Pad {
   Pad() { std::fill_n(noise_Pa, SENSORS, NOISE_Pa); }
 };
 
-Rest measure(const Pad &pad, const Signal &signal, double seconds = 10, double rate_Hz = 200) {
+static Rest measure(const Pad &pad, const Signal &signal, double seconds = 10, double rate_Hz = 200) {
   std::mt19937 random(20260101);
   std::normal_distribution<double> gaussian;
   RestMeter meter;
@@ -49,9 +47,7 @@ Rest measure(const Pad &pad, const Signal &signal, double seconds = 10, double r
   return meter.result();
 }
 
-double nothing(unsigned, double) { return 0; }
-
-} // namespace
+static double nothing(unsigned, double) { return 0; }
 
 TEST(Rest, EdgesAndThoseThatAreMissing) {
   RestMeter meter;

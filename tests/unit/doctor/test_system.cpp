@@ -10,8 +10,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-namespace {
-
 namespace fs = std::filesystem;
 
 const char *const TTY_RULE =
@@ -59,8 +57,6 @@ private:
   std::string path_;
   pid_t child_ = 0;
 };
-
-} // namespace
 
 TEST_F(System, RuleIsFoundWhereUdevLooks) {
   EXPECT_EQ(rule(), "");

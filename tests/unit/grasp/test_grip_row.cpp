@@ -11,9 +11,7 @@
 
 using namespace fingertip;
 
-namespace {
-
-GripRow row_with_everything() {
+static GripRow row_with_everything() {
   GripRow row;
   row.time_us = 1530022.5;
   row.report.state = GRIP_SLIPPING;
@@ -32,7 +30,7 @@ GripRow row_with_everything() {
   return row;
 }
 
-std::string error_of(const std::string &value) {
+static std::string error_of(const std::string &value) {
   try {
     grip_row(value);
   } catch (const Error &error) {
@@ -43,7 +41,7 @@ std::string error_of(const std::string &value) {
 }
 
 /* The value of a line whose cell of this column is another. */
-std::string with_cell(const std::string &column, const std::string &cell) {
+static std::string with_cell(const std::string &column, const std::string &cell) {
   const std::string header = "time_us," + grip_columns();
   const std::string value = "1530022.5," + grip_cells(row_with_everything());
   const auto names = split(header, ',');
@@ -67,8 +65,6 @@ protected:
   test::TemporaryFolder folder_;
   std::string path_ = folder_ / "g.csv";
 };
-
-} // namespace
 
 TEST(GripRow, ReadsWhatItWrote) {
   const std::string cells = grip_cells(row_with_everything());

@@ -8,8 +8,6 @@
 using namespace fingertip;
 using std::chrono::milliseconds;
 
-namespace {
-
 class GripperThreadTest : public ::testing::Test {
 protected:
   static constexpr std::chrono::seconds PATIENCE{20};
@@ -36,8 +34,6 @@ protected:
   std::shared_ptr<test::FakeGripperState> state_ = std::make_shared<test::FakeGripperState>();
   std::vector<GripperThread::News> all_;
 };
-
-} // namespace
 
 TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
   state_->delay_ms = 5;

@@ -5,13 +5,13 @@
 
 using namespace fingertip;
 
-namespace {
-
 constexpr double STIFFNESS_N = 2.0, POWER = 1.6; // of a pad at 1 mm: softer than is expected
 constexpr double OBJECT_mm = 40.0, CAP_N = 6.0;
 constexpr double PRESSED_mm = OBJECT_mm - 1.0, AIR_mm = OBJECT_mm + 1.0; // widths
 
-double pad_N(double width_mm) { return STIFFNESS_N * std::pow(std::max(0.5 * (OBJECT_mm - width_mm), 0.0), POWER); }
+static double pad_N(double width_mm) {
+  return STIFFNESS_N * std::pow(std::max(0.5 * (OBJECT_mm - width_mm), 0.0), POWER);
+}
 
 // A gripper that cannot limit its own force to the cap, between two fingertips.
 class Bench {
@@ -59,22 +59,20 @@ public:
   double t_s = 1.0, width_mm;
 };
 
-double room_of_stiff_mm() {
+static double room_of_stiff_mm() {
   Bench bench;
   bench.send(2);
   bench.feel();
   return bench.room_mm();
 }
 
-double room_as_shown_mm() {
+static double room_as_shown_mm() {
   Bench bench;
   bench.feel();
   bench.send(2);
   bench.feel();
   return bench.room_mm();
 }
-
-} // namespace
 
 TEST(GripReach, AMoveThatBeginsAndEndsAtRestOnTheObjectShowsHowStiffItIs) {
   EXPECT_GT(room_as_shown_mm(), room_of_stiff_mm() + gripper_traits("2f85").step_mm - 1e-9);

@@ -8,11 +8,9 @@
 
 using namespace fingertip;
 
-namespace {
+static const GripperTraits &any() { return gripper_traits("2f85"); }
 
-const GripperTraits &any() { return gripper_traits("2f85"); }
-
-std::string error_of(const std::map<std::string, double> &wanted) {
+static std::string error_of(const std::map<std::string, double> &wanted) {
   try {
     settings_for(any(), wanted);
   } catch (const Error &error) {
@@ -21,8 +19,6 @@ std::string error_of(const std::map<std::string, double> &wanted) {
   }
   return "";
 }
-
-} // namespace
 
 TEST(GraspSettings, WithoutWishesTheyAreTheGrippersDefaults) {
   for (const GripperTraits &traits : gripper_models()) {

@@ -5,18 +5,16 @@
 
 using namespace fingertip;
 
-namespace {
-
 constexpr double STEP_s = 0.001;
 
-void run(GripperMotion &motion, double seconds) {
+static void run(GripperMotion &motion, double seconds) {
   const long steps = std::lround(seconds / STEP_s);
   for (long i = 0; i < steps; i++) {
     motion.step(STEP_s);
   }
 }
 
-GripperMotion activated(const char *model) {
+static GripperMotion activated(const char *model) {
   GripperMotion motion(gripper_mechanics(model));
   motion.activate();
   run(motion, motion.mechanics().activation_s + 0.01);
@@ -26,13 +24,11 @@ GripperMotion activated(const char *model) {
 }
 
 /* An object of this width that pushes back with so much a millimetre, as springs do. */
-auto spring(double width_mm, double stiffness_N_mm) {
+static auto spring(double width_mm, double stiffness_N_mm) {
   return [=](double at_mm, double force_N) {
     return force_N > 0 && at_mm < width_mm && (width_mm - at_mm) * stiffness_N_mm >= force_N;
   };
 }
-
-} // namespace
 
 TEST(GripperMotion, MovesOnlyOnceActivated) {
   GripperMotion motion(gripper_mechanics("2f85"));

@@ -8,8 +8,6 @@
 using namespace fingertip;
 namespace fs = std::filesystem;
 
-namespace {
-
 /* A piece of /sys and /dev as Linux shows serial adapters on USB. */
 class FakeSystem : public ::testing::Test {
 protected:
@@ -49,8 +47,6 @@ protected:
 
   fs::path root_;
 };
-
-} // namespace
 
 TEST_F(FakeSystem, FindsAdaptersAndTheirTimers) {
   plug_in("1-1", "ttyUSB0", "0403", "6015", "RS485 cable", "16");

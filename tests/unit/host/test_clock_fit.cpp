@@ -8,8 +8,6 @@
 
 using namespace fingertip;
 
-namespace {
-
 /* A fingertip whose clock is off, and the delays of USB and of a busy main loop between. */
 struct Device {
   double zero_us; /* host time at which its clock was zero */
@@ -28,7 +26,7 @@ constexpr double HOST_us = 5e12; /* two months of uptime */
 
 /* Exchanges every 100 ms, after a burst, and the largest error of any frame after that, us; the
  * bound must hold at every exchange. */
-double worst_error_us(const Device &device, double seconds, std::uint64_t seed, double burst_us = 0) {
+static double worst_error_us(const Device &device, double seconds, std::uint64_t seed, double burst_us = 0) {
   ClockFit fit;
   double worst = 0;
   double sent_us = HOST_us;
@@ -120,8 +118,6 @@ private:
 };
 
 const std::vector<Device> APART = {{HOST_us - 3e6, 25}, {HOST_us - 7.5e6, -25}, {HOST_us - 1e6, 3}};
-
-} // namespace
 
 TEST(ClockFit, AMinuteFiftyPartsPerMillionApart) {
   for (std::uint64_t seed = 1; seed <= 3; seed++) {

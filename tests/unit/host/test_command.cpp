@@ -11,18 +11,14 @@
 
 using namespace fingertip;
 
-namespace {
-
-wire_packet decoded(const wire_packet &command) {
+static wire_packet decoded(const wire_packet &command) {
   auto bytes = frame_bytes(command);
   wire_packet packet{};
   EXPECT_EQ(wire_decode(wire_commands, bytes.data(), bytes.size() - 1, &packet), FT_OK);
   return packet;
 }
 
-wire_packet set(const std::string &text) { return setting_commands({setting_from_text(text)}, {})[0]; }
-
-} // namespace
+static wire_packet set(const std::string &text) { return setting_commands({setting_from_text(text)}, {})[0]; }
 
 TEST(Command, CarriesItsValue) {
   EXPECT_EQ(decoded(command_stream(7)).body.cmd_stream.streams, 7);

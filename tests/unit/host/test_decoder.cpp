@@ -8,11 +8,11 @@
 
 using namespace fingertip;
 
-namespace {
+static Bytes frame(std::uint16_t sequence) {
+  return frame_bytes(test::make_contact(sequence, 1000u * sequence, sequence));
+}
 
-Bytes frame(std::uint16_t sequence) { return frame_bytes(test::make_contact(sequence, 1000u * sequence, sequence)); }
-
-Bytes joined(std::initializer_list<Bytes> parts) {
+static Bytes joined(std::initializer_list<Bytes> parts) {
   Bytes all;
   for (const Bytes &part : parts) {
     all.insert(all.end(), part.begin(), part.end());
@@ -25,7 +25,7 @@ struct Result {
   LineStatistics statistics;
 };
 
-Result decode(const Bytes &bytes, std::size_t chunk = 4096) {
+static Result decode(const Bytes &bytes, std::size_t chunk = 4096) {
   Decoder decoder;
   Result result;
   for (std::size_t at = 0; at < bytes.size(); at += chunk) {
@@ -36,7 +36,7 @@ Result decode(const Bytes &bytes, std::size_t chunk = 4096) {
   return result;
 }
 
-Bytes body_of(std::size_t length, int pattern) {
+static Bytes body_of(std::size_t length, int pattern) {
   Bytes packet{WIRE_VERSION};
   packet.resize(WIRE_HEADER_BYTES + length);
   for (std::size_t i = 0; i < length; i++) {
@@ -45,11 +45,9 @@ Bytes body_of(std::size_t length, int pattern) {
   return packet;
 }
 
-std::uint64_t errors(const LineStatistics &statistics) {
+static std::uint64_t errors(const LineStatistics &statistics) {
   return statistics.crc_errors + statistics.format_errors + statistics.version_errors + statistics.unknown_types;
 }
-
-} // namespace
 
 /* Versions, types, damage, noise and what is too long: the streams of tests/formats have them, also for Python. */
 TEST(Decoder, FindsPacketsHoweverTheBytesArePartitioned) {

@@ -11,8 +11,6 @@
 using namespace fingertip;
 namespace fs = std::filesystem;
 
-namespace {
-
 /* A piece of /sys and /dev as Linux shows a USB CDC device. */
 class FakeSystem : public ::testing::Test {
 protected:
@@ -59,8 +57,6 @@ protected:
 private:
   test::TemporaryFolder folder_;
 };
-
-} // namespace
 
 TEST_F(FakeSystem, FindsOursAndNoOther) {
   plug_in("1-1", "ttyACM0", "arduino", true, "2341", "0043");

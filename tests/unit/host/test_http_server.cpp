@@ -14,10 +14,8 @@
 using namespace fingertip;
 using namespace std::chrono_literals;
 
-namespace {
-
 /* What a client gets that takes all there is, with such pauses, until the end. */
-std::string answered(const HttpServer::Handler &handler, std::chrono::seconds pause) {
+static std::string answered(const HttpServer::Handler &handler, std::chrono::seconds pause) {
   HttpServer server("127.0.0.1", 0, "");
   const int fd = socket(AF_INET, SOCK_STREAM, 0), ahead_bytes = 65536;
   setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &ahead_bytes, sizeof ahead_bytes);
@@ -54,5 +52,3 @@ TEST(HttpServer, AnswersWhereItsHandlerThrows) {
   const auto handler = [](const HttpRequest &) -> HttpAnswer { throw std::runtime_error("no memory"); };
   EXPECT_EQ(answered(handler, 1s).substr(0, 12), "HTTP/1.1 500");
 }
-
-} // namespace

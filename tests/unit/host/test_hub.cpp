@@ -10,8 +10,6 @@ using namespace fingertip;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-namespace {
-
 /* A fingertip that says what a test has it say, and a hub with clients around it. */
 class HubTest : public ::testing::Test {
 protected:
@@ -117,8 +115,6 @@ private:
 };
 
 constexpr std::uint8_t BOTH = WIRE_STREAM_CONTACT | WIRE_STREAM_RAW;
-
-} // namespace
 
 TEST_F(HubTest, AsksWhoIsThereAndForNoStreams) {
   hub.tick(now);

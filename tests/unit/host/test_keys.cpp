@@ -5,10 +5,8 @@
 using namespace fingertip;
 using std::chrono::milliseconds;
 
-namespace {
-
 /* What a terminal sends, in pieces with so much time between them. */
-std::string keys_of(const std::vector<std::string> &pieces, milliseconds gap = milliseconds(1)) {
+static std::string keys_of(const std::vector<std::string> &pieces, milliseconds gap = milliseconds(1)) {
   KeyParser parser;
   HostTime now{};
   std::string keys;
@@ -21,15 +19,13 @@ std::string keys_of(const std::vector<std::string> &pieces, milliseconds gap = m
   return keys;
 }
 
-std::vector<std::string> bytewise(const std::string &text) {
+static std::vector<std::string> bytewise(const std::string &text) {
   std::vector<std::string> pieces;
   for (char c : text) {
     pieces.emplace_back(1, c);
   }
   return pieces;
 }
-
-} // namespace
 
 TEST(Keys, PlainOnesComeInOrder) { EXPECT_EQ(keys_of({"qt", "y"}), "qty"); }
 

@@ -13,12 +13,10 @@
 
 using namespace fingertip;
 
-namespace {
-
 constexpr std::uint32_t FITTED = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
                                  CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED;
 
-Model model_with_info() {
+static Model model_with_info() {
   Model model;
   model.set_state(Model::State::replay);
   model.take(test::make_info(0, 0));
@@ -29,7 +27,7 @@ Model model_with_info() {
 constexpr std::uint32_t PULLED = FITTED | CONTACT_FLAG_TANGENTIAL_VALID;
 
 /* Of a fingertip that can tell tangential load. */
-Model model_of_grasp(bool with_pad) {
+static Model model_of_grasp(bool with_pad) {
   Model model = model_with_info();
   wire_packet info = test::make_info(0, 0);
   info.body.info.capabilities |= WIRE_CAPABILITY_TANGENTIAL;
@@ -46,8 +44,8 @@ struct Pull {
 };
 
 /* A contact of 5.7 mm and 5 N, and what the sensors under it measure. */
-void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_mm, float y_mm, float force_N,
-                std::uint32_t flags, const Pull &pull = {}) {
+static void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_mm, float y_mm, float force_N,
+                       std::uint32_t flags, const Pull &pull = {}) {
   constexpr float sigma_mm = 5.7f, pi = 3.14159265f;
   float p0_Pa = force_N / (2 * pi * sigma_mm * sigma_mm * 1e-6f);
   wire_packet contact = test::make_contact(0, t_us, frame);
@@ -77,14 +75,14 @@ void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_m
 }
 
 /* After two seconds of one contact, 50 frames a second. */
-Model touched(Model model, float x_mm, float y_mm, std::uint32_t flags = FITTED, const Pull &pull = {}) {
+static Model touched(Model model, float x_mm, float y_mm, std::uint32_t flags = FITTED, const Pull &pull = {}) {
   for (std::uint32_t frame = 0; frame < 100; frame++) {
     take_frame(model, 1000000 + 20000 * frame, frame, x_mm, y_mm, 5, flags, pull);
   }
   return model;
 }
 
-std::string text_of(const Canvas &canvas) {
+static std::string text_of(const Canvas &canvas) {
   std::string text;
   for (int row = 0; row < canvas.rows(); row++) {
     for (int column = 0; column < canvas.columns(); column++) {
@@ -96,9 +94,11 @@ std::string text_of(const Canvas &canvas) {
   return text;
 }
 
-bool shows(const Canvas &canvas, const std::string &text) { return text_of(canvas).find(text) != std::string::npos; }
+static bool shows(const Canvas &canvas, const std::string &text) {
+  return text_of(canvas).find(text) != std::string::npos;
+}
 
-Canvas one(const Model &model, int columns = 80, int rows = 24) {
+static Canvas one(const Model &model, int columns = 80, int rows = 24) {
   return draw_monitor({model}, {"keys", "note", ""}, columns, rows);
 }
 
@@ -108,7 +108,7 @@ struct Sent {
   std::size_t changes = 0, all = 0;
 };
 
-Sent sent_in_ten_seconds(int columns, int rows, std::uint32_t flags) {
+static Sent sent_in_ten_seconds(int columns, int rows, std::uint32_t flags) {
   Model model = flags & CONTACT_FLAG_TANGENTIAL_VALID ? model_of_grasp(true) : model_with_info();
   Painter painter(ColourDepth::truecolour, Characters::utf_8);
   Sent sent;
@@ -128,14 +128,12 @@ Sent sent_in_ten_seconds(int columns, int rows, std::uint32_t flags) {
   return sent;
 }
 
-void report(const std::string &json) {
+static void report(const std::string &json) {
   if (const char *path = std::getenv("FINGERTIP_REPORT")) {
     std::filesystem::create_directories(std::filesystem::path(path).parent_path());
     std::ofstream(path) << json;
   }
 }
-
-} // namespace
 
 TEST(Monitor, SendsATenthOfWhatFullPicturesTook) {
   /* Measured at 200 x 60 before: every cell at 25 Hz, 2.3 MB/s. */

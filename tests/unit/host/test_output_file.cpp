@@ -12,14 +12,12 @@
 using namespace fingertip;
 namespace fs = std::filesystem;
 
-namespace {
-
 constexpr auto WHEN_FINISHED = OutputFile::Appears::when_finished;
 
-void write(const std::string &path, const std::string &text) { std::ofstream(path, std::ios::binary) << text; }
+static void write(const std::string &path, const std::string &text) { std::ofstream(path, std::ios::binary) << text; }
 
 /* Nothing: it may be written. */
-std::optional<ErrorCode> refusal(const std::string &path, bool replace) {
+static std::optional<ErrorCode> refusal(const std::string &path, bool replace) {
   try {
     check_output(path, replace);
   } catch (const Error &error) {
@@ -28,11 +26,9 @@ std::optional<ErrorCode> refusal(const std::string &path, bool replace) {
   return std::nullopt;
 }
 
-long files_in(const std::string &folder) {
+static long files_in(const std::string &folder) {
   return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
 }
-
-} // namespace
 
 TEST(OutputFile, AnUnfinishedOneLeavesTheOldFile) {
   test::TemporaryFolder folder;

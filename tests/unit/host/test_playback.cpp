@@ -8,8 +8,6 @@
 using namespace fingertip;
 using std::chrono::milliseconds;
 
-namespace {
-
 /* A minute at 50 frames a second, in which the device restarts after half of it. */
 class PlaybackTest : public ::testing::Test {
 protected:
@@ -46,8 +44,6 @@ protected:
   std::string path_;
   HostTime now_{};
 };
-
-} // namespace
 
 TEST_F(PlaybackTest, KeepsTheRecordedPace) {
   Playback playback(path_, false, "", 1);

@@ -11,12 +11,10 @@
 
 using namespace fingertip;
 
-namespace {
-
 using Frames = std::vector<std::vector<std::uint8_t>>;
 
 /* Two packets are the same if their frames are. */
-Frames frames_of(const std::vector<wire_packet> &packets) {
+static Frames frames_of(const std::vector<wire_packet> &packets) {
   Frames frames;
   for (const wire_packet &packet : packets) {
     frames.push_back(frame_bytes(packet));
@@ -24,7 +22,7 @@ Frames frames_of(const std::vector<wire_packet> &packets) {
   return frames;
 }
 
-std::vector<wire_packet> all_kinds() {
+static std::vector<wire_packet> all_kinds() {
   return {
       test::make_info(0, 10),         test::make_ack(1, 20, WIRE_CMD_STREAM, WIRE_RESULT_OUT_OF_RANGE, 65535, ~0ull),
       test::make_contact(2, 1000, 1), test::make_raw(3, 1000, 1),
@@ -61,8 +59,6 @@ struct Recorded {
     return frames_of(packets);
   }
 };
-
-} // namespace
 
 /* What a reader makes of other and of damaged files is compared with Python and the page in tests/formats. */
 TEST(Recording, GivesBackEveryFieldOfEveryPacketInARowPerFrame) {

@@ -8,8 +8,6 @@
 using namespace fingertip;
 using std::chrono::milliseconds;
 
-namespace {
-
 /* A line in memory: what the host writes is answered by a function. */
 class FakeTransport : public Transport {
 public:
@@ -54,7 +52,7 @@ private:
 
 const Session::Policy QUICK = {milliseconds(20), 3};
 
-std::string error_of(const std::function<void()> &action) {
+static std::string error_of(const std::function<void()> &action) {
   try {
     action();
   } catch (const Error &error) {
@@ -62,8 +60,6 @@ std::string error_of(const std::function<void()> &action) {
   }
   return "";
 }
-
-} // namespace
 
 TEST(Session, RepeatsACommandUntilItIsAcknowledged) {
   FakeTransport line;

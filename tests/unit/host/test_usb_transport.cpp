@@ -13,8 +13,6 @@ using namespace fingertip;
 using std::chrono::milliseconds;
 using Result = Transport::Result;
 
-namespace {
-
 class Usb : public ::testing::Test {
 protected:
   Usb() { fake_libusb::reset(); }
@@ -50,13 +48,11 @@ protected:
   }
 };
 
-std::vector<std::uint8_t> counting(std::size_t length) {
+static std::vector<std::uint8_t> counting(std::size_t length) {
   std::vector<std::uint8_t> bytes(length);
   std::iota(bytes.begin(), bytes.end(), std::uint8_t{0});
   return bytes;
 }
-
-} // namespace
 
 TEST_F(Usb, OpensLikeAPortAndGivesTheDriverBack) {
   auto &device = plug_in("A");

@@ -10,14 +10,12 @@
 
 using namespace fingertip;
 
-namespace {
-
 const wire_info INFO = test::make_info(0, 0).body.info;
 
-pad_profile profile_of(double thickness_mm) { return pad::profile_of({thickness_mm}, INFO); }
+static pad_profile profile_of(double thickness_mm) { return pad::profile_of({thickness_mm}, INFO); }
 
 /* The integral of f over wave numbers, by the trapezoidal rule of other nodes than the profile's. */
-double over_waves(const std::function<double(double)> &f) {
+static double over_waves(const std::function<double(double)> &f) {
   double sum = 0;
   for (int i = 1; i < 30000; i++) {
     sum += 0.001 * f(0.001 * i);
@@ -27,7 +25,7 @@ double over_waves(const std::function<double(double)> &f) {
 
 constexpr double h_mm = 10;
 
-double normal_of(const pad_profile &pad, double H) {
+static double normal_of(const pad_profile &pad, double H) {
   double sum = 0;
   for (const auto &term : pad.normal) {
     sum += double(term.share) * std::exp(-0.5 * std::pow(H * double(term.sd_mm) / h_mm, 2));
@@ -35,7 +33,7 @@ double normal_of(const pad_profile &pad, double H) {
   return sum;
 }
 
-double tangential_of(const pad_profile &pad, double H) {
+static double tangential_of(const pad_profile &pad, double H) {
   double sum = 0;
   for (const auto &term : pad.tangential) {
     sum += H * double(term.moment_mm) / h_mm * std::exp(-0.5 * std::pow(H * double(term.sd_mm) / h_mm, 2));
@@ -47,7 +45,7 @@ double tangential_of(const pad_profile &pad, double H) {
 struct Misfit {
   double normal, tangential;
 };
-Misfit misfit_of(const pad_profile &pad) {
+static Misfit misfit_of(const pad_profile &pad) {
   auto T = [](double H) { return twin::base_transfer(H, 0.49); };
   auto Q = [](double H) { return twin::tangential_transfer(H, 0.49); };
   return {std::sqrt(over_waves([&](double H) { return H * std::pow(T(H) - normal_of(pad, H), 2); }) /
@@ -55,8 +53,6 @@ Misfit misfit_of(const pad_profile &pad) {
           std::sqrt(over_waves([&](double H) { return H * std::pow(Q(H) - tangential_of(pad, H), 2); }) /
                     over_waves([&](double H) { return H * Q(H) * Q(H); }))};
 }
-
-} // namespace
 
 TEST(PadProfile, HoldsTheLayerWithinItsError) {
   pad_profile pad = profile_of(h_mm);

@@ -6,12 +6,10 @@
 
 using namespace fingertip;
 
-namespace {
-
 constexpr measure::PadOptions USUAL{.memory_percent = 1.0, .misplaced_mm = 0.1};
 
 /* Of a session of 24 placements on a pad of the twin. */
-pad::Thickness found_on(double layer_mm, const measure::PadOptions &options, std::uint64_t seed) {
+static pad::Thickness found_on(double layer_mm, const measure::PadOptions &options, std::uint64_t seed) {
   const measure::Feet feet(layer_mm, FINGERTIP_TABLES_DIR);
   measure::SessionPad pad(options, layer_mm, seed);
   measure::Session session(feet, measure::SessionKind::good, seed, 24);
@@ -82,5 +80,3 @@ TEST(PadThickness, ACalibrationWithoutAWidthTellsNone) {
   made.sigma_sd_um = 20;
   EXPECT_NEAR(pad::thickness_of(made)->mm, 12.0, 0.3);
 }
-
-} // namespace

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <gtest/gtest.h>
 
-namespace {
-
 using namespace fingertip;
 using namespace fingertip::twin;
 
@@ -15,11 +13,11 @@ constexpr double AMBIENT_Pa = 101325.0;
 constexpr std::size_t SENSORS = 15;
 constexpr double LAYER_mm = 12.0;
 
-Pad pad_with(const std::string &effects, std::uint64_t seed = 1) {
+static Pad pad_with(const std::string &effects, std::uint64_t seed = 1) {
   return Pad(parse_effects(effects), SENSORS, LAYER_mm, AMBIENT_Pa, seed);
 }
 
-std::vector<double> reported(Pad &pad, double t_s, double base_Pa) {
+static std::vector<double> reported(Pad &pad, double t_s, double base_Pa) {
   std::vector<double> out(SENSORS);
   pad.report(t_s, std::vector<double>(SENSORS, base_Pa), out);
   return out;
@@ -29,7 +27,7 @@ std::vector<double> reported(Pad &pad, double t_s, double base_Pa) {
 struct Corner {
   double t_s, base_Pa;
 };
-std::vector<double> along(Pad &pad, const std::vector<Corner> &corners, double step_s) {
+static std::vector<double> along(Pad &pad, const std::vector<Corner> &corners, double step_s) {
   std::vector<double> readings{reported(pad, corners[0].t_s, corners[0].base_Pa)[0]};
   for (std::size_t i = 1; i < corners.size(); i++) {
     const Corner &a = corners[i - 1], &b = corners[i];
@@ -53,7 +51,7 @@ TEST(Effects, NoneChangesNothing) {
 }
 
 // Of a force along a path that is linear between its corners.
-double share_after(Pad &pad, const std::vector<std::pair<double, double>> &corners, double step_s) {
+static double share_after(Pad &pad, const std::vector<std::pair<double, double>> &corners, double step_s) {
   double share = 1.0, t_s = corners[0].first;
   for (std::size_t i = 1; i < corners.size(); i++) {
     const auto [end_s, end_N] = corners[i];
@@ -341,7 +339,7 @@ TEST(Effects, TemperatureRisesThroughTheLayerAndLeavesPressuresAlone) {
 }
 
 // The rule itself, in real numbers: what a part says whose codes are these.
-double compensated_Pa(const std::array<double, 6> &c, double d1, double dT, bool very_cold) {
+static double compensated_Pa(const std::array<double, 6> &c, double d1, double dT, bool very_cold) {
   const double below = dT * c[5] / 0x1p23;
   double offset = c[1] * 0x1p17 + c[3] * dT / 0x1p6;
   double sensitivity = c[0] * 0x1p16 + c[2] * dT / 0x1p7;
@@ -437,5 +435,3 @@ TEST(Effects, AreParsed) {
     EXPECT_STREQ(error.what(), "effect clip is \"9999\"; give 1.2 to 10 (bar)");
   }
 }
-
-} // namespace

@@ -5,8 +5,6 @@
 #include <functional>
 #include <gtest/gtest.h>
 
-namespace {
-
 using fingertip::twin::HeldObject;
 
 constexpr double MASS_kg = 0.15, FRICTION = 0.5, KINETIC_SHARE = 0.8;
@@ -14,11 +12,11 @@ constexpr double FORCE_N = 6.0, STIFFNESS_N_mm = 4.5;
 constexpr double HOLDS_N = FRICTION * FORCE_N;
 constexpr double DEAD_TRAVEL_mm = 1.5 * HOLDS_N / STIFFNESS_N_mm;
 
-HeldObject object() { return HeldObject(MASS_kg, FRICTION, KINETIC_SHARE); }
+static HeldObject object() { return HeldObject(MASS_kg, FRICTION, KINETIC_SHARE); }
 
-double mindlin_mm(double load_share) { return DEAD_TRAVEL_mm * (1.0 - std::pow(1.0 - load_share, 2.0 / 3.0)); }
+static double mindlin_mm(double load_share) { return DEAD_TRAVEL_mm * (1.0 - std::pow(1.0 - load_share, 2.0 / 3.0)); }
 
-void play(
+static void play(
     HeldObject &held, double seconds, const std::function<double(double)> &load_N,
     const std::function<double(double)> &force_N = [](double) { return FORCE_N; }, double step_s = HeldObject::STEP_s) {
   const long steps = std::lround(seconds / step_s);
@@ -29,7 +27,7 @@ void play(
 }
 
 // From one load to another, from rest to rest, in a second.
-std::function<double(double)> ramp(double from_N, double to_N) {
+static std::function<double(double)> ramp(double from_N, double to_N) {
   return [=](double t_s) {
     const double u = std::min(t_s, 1.0);
     return from_N + (to_N - from_N) * u * u * (3.0 - 2.0 * u);
@@ -143,5 +141,3 @@ TEST(HeldObject, StepsAreShortEnough) {
   EXPECT_GT(exact_mm, 2.0);
   EXPECT_NEAR(ends_mm(HeldObject::STEP_s), exact_mm, 0.003);
 }
-
-} // namespace

@@ -6,15 +6,15 @@
 #include <gtest/gtest.h>
 #include <set>
 
-namespace {
-
 using namespace fingertip::twin;
 
 constexpr double MS_s = 1e-3, GRAVITY_m_s2 = 9.81;
 
-double pull_N(const Touch &touch) { return std::hypot(touch.pull_x_N, touch.pull_y_N); }
+static double pull_N(const Touch &touch) { return std::hypot(touch.pull_x_N, touch.pull_y_N); }
 
-double way_mm(const Touch &from, const Touch &to) { return std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm); }
+static double way_mm(const Touch &from, const Touch &to) {
+  return std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm);
+}
 
 TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
   const Scenario scenario = scenario_of("drag", [](ScenarioOptions &o) {
@@ -66,7 +66,7 @@ TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
   EXPECT_LE(*frictions.rbegin(), 0.6);
 }
 
-const Scenario &slides() {
+static const Scenario &slides() {
   static const Scenario scenario = scenario_of("slide", [](ScenarioOptions &o) { o.seconds = 600; });
   return scenario;
 }
@@ -305,5 +305,3 @@ TEST(Lift, ThreeTimesTwoHundredWithShareForceAndPlaceOfTheirOwn) {
     EXPECT_GT(count, 60);
   }
 }
-
-} // namespace

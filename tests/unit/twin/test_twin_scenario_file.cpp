@@ -13,8 +13,6 @@
 #include <map>
 #include <sstream>
 
-namespace {
-
 using namespace fingertip;
 using namespace fingertip::twin;
 
@@ -36,7 +34,7 @@ struct File {
   }
 };
 
-File written(const Scenario &scenario, const BlockTable *block = nullptr) {
+static File written(const Scenario &scenario, const BlockTable *block = nullptr) {
   const std::string path = testing::TempDir() + "twin_scenario.csv";
   write_scenario(scenario, silicone(LAYER_mm), table_of(scenario.options.indenter), block, path, true);
   std::stringstream text;
@@ -302,5 +300,3 @@ TEST(ScenarioFile, HasItsEffectsInIt) {
   EXPECT_EQ(plain.metadata.count("aftereffects_percent"), 0u);
   EXPECT_EQ(plain.column.count("temperature_degC"), 0u);
 }
-
-} // namespace

@@ -6,8 +6,6 @@
 #include <map>
 #include <set>
 
-namespace {
-
 using namespace fingertip;
 using namespace fingertip::twin;
 
@@ -261,5 +259,3 @@ TEST(Scenarios, LongerOnesBeginAlikeAndEffectsDoNotMoveContacts) {
   const Scenario other = scenario_of("taps", [](ScenarioOptions &o) { o.seed = 2; });
   EXPECT_FALSE(brief.episodes[0].tracks[0].at(0.2) == other.episodes[0].tracks[0].at(0.2));
 }
-
-} // namespace

@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 #include <stdexcept>
 
-namespace {
-
 using namespace fingertip::twin;
 
 TEST(Profile, IsContinuousAndHitsItsValues) {
@@ -174,5 +172,3 @@ TEST(Track, LeavesThePadSmoothly) {
   EXPECT_NEAR(track.at(1.5).force_N, 3.0, 1e-9);
   EXPECT_NEAR(before.force_N, 0.0, 1e-9);
 }
-
-} // namespace

@@ -4,15 +4,13 @@
 #include <cmath>
 #include <gtest/gtest.h>
 
-namespace {
-
 using namespace fingertip::web;
 
 constexpr double FRICTION = 0.5, KINETIC_SHARE = 0.8, FORCE_N = 6.0, STIFFNESS_N_mm = 4.5;
 constexpr double RADIUS_mm = 4.0, STEP_s = 5e-5;
 constexpr double HOLDS_N = FRICTION * FORCE_N;
 
-Wrench move(Bundle &bundle, const Motion &motion, double seconds) {
+static Wrench move(Bundle &bundle, const Motion &motion, double seconds) {
   Wrench last;
   for (long i = 0; i < std::lround(seconds / STEP_s); i++) {
     last = bundle.step(STEP_s, FORCE_N, STIFFNESS_N_mm, RADIUS_mm, motion);
@@ -101,5 +99,3 @@ TEST(Bundle, NeverGivesEnergyAway) {
   EXPECT_GT(lost_mJ, 10.0);
   EXPECT_NEAR(work_mJ, lost_mJ + bundle.elastic_mJ(STIFFNESS_N_mm), 0.01 * work_mJ);
 }
-
-} // namespace

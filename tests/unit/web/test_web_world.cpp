@@ -14,18 +14,17 @@ extern "C" {
 #include <stdexcept>
 
 namespace fingertip::web {
-namespace {
 
 constexpr double AMBIENT_Pa = 101325.0;
 constexpr unsigned MIDDLE = 7; // the sensor at the origin
 constexpr double FRICTION = 0.5;
 
-const std::vector<std::uint8_t> &file() {
+static const std::vector<std::uint8_t> &file() {
   static const std::vector<std::uint8_t> bytes = written(objects_of_twin(FINGERTIP_TEST_TABLES));
   return bytes;
 }
 
-std::vector<Object> objects() { return read_objects(file().data(), file().size()).objects; }
+static std::vector<Object> objects() { return read_objects(file().data(), file().size()).objects; }
 
 class WorldTest : public ::testing::Test {
 protected:
@@ -233,5 +232,4 @@ TEST(World, PadsHaveTheTwinsErrors) {
   }
 }
 
-} // namespace
 } // namespace fingertip::web
