@@ -55,7 +55,7 @@ static void take(struct condition *condition, uint8_t k, int32_t reading_Pa_q10)
   }
   const int32_t mean = mean_of(sensor->tare_sum - sensor->tare_min - sensor->tare_max, taken - 2);
   const int32_t level = clamp(mean, -LEVEL_MAX, LEVEL_MAX);
-  sensor->level_Pa_q10 = sensor->before_Pa_q10 = sensor->slow_Pa_q10 = level;
+  sensor->level_Pa_q10 = sensor->rests_Pa_q10 = sensor->before_Pa_q10 = sensor->slow_Pa_q10 = level;
   sensor->updated_ms = condition->now_ms;
   condition->taring &= ~(UINT32_C(1) << k);
   condition->zero_Pa_q10[k] = level;

@@ -27,7 +27,8 @@
  * - A long contact leaves a drift too, as far as a barometer may have drifted in it.
  *
  * Past: what rubber keeps shows at rest, and goes on for 1 to 4 s in the next contact.
- * - So the remainder at a touch fades in the contact, with PAST_ms.
+ * - So what the zero is off at a touch from where it comes to rest fades in the contact, with PAST_ms. Where it comes
+ * to rest: where it was before, within PAST_SDS of what may be kept.
  * - Its amount is uncertain, and so is what a hold itself changes in this sensor alone. past_sd_Pa_q10 is the sd of
  * both: a share of what the sensor has measured, which rises in a hold and by all that it lets go of, after a contact
  * or where one moves on, and fades with PAST_ms. The share is learnt from what stands off after each contact.
@@ -70,6 +71,7 @@ struct gate {
 /* All that is remembered of one sensor. */
 struct condition_sensor {
   int32_t level_Pa_q10;
+  int32_t rests_Pa_q10;   /* where the zero goes in a contact, once what rubber keeps has faded */
   int32_t spread_Pa_q10;  /* 0: settled */
   int32_t memory_Pa_q10;  /* strongest press, fading */
   int32_t reached_Pa_q10; /* the same of this contact alone */

@@ -36,6 +36,7 @@ static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q
 static void follow_past(const struct step *step) { (void)step; }
 static void learn_past(const struct step *step, int32_t above_level_Pa_q10) { (void)step, (void)above_level_Pa_q10; }
 static void forget_past(struct condition_sensor *sensor) { (void)sensor; }
+static void follow_rest(const struct step *step) { step->sensor->rests_Pa_q10 = step->sensor->level_Pa_q10; }
 void update_past_shows(struct condition *condition, uint8_t count) { (void)condition, (void)count; }
 #else
 /* Of a press: an eighth, or twice the sd of what this sensor has kept of others. */
@@ -91,6 +92,16 @@ static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
 static void forget_past(struct condition_sensor *sensor) {
   sensor->past_Pa_q10 = 0;
   sensor->past_share = larger(sensor->past_share, PAST_SHARE);
+}
+
+/* The level takes over what rubber keeps, and sooner upwards. So where the zero comes to rest is where it was, within
+ * what may be kept; after a contact not before this has been learnt from it. */
+static void follow_rest(const struct step *step) {
+  if (!(step->condition->to_learn >> step->k & 1u)) {
+    const int32_t zero = step->condition->zero_Pa_q10[step->k];
+    const int32_t keeps = PAST_SDS * step->condition->past_sd_Pa_q10[step->k];
+    step->sensor->rests_Pa_q10 = clamp(step->sensor->rests_Pa_q10, zero - keeps, zero + keeps);
+  }
 }
 
 void update_past_shows(struct condition *condition, uint8_t count) {
@@ -194,9 +205,10 @@ static void hold(const struct step *step) {
   if (condition->gate.pressed_ms < DRIFT_GOES_ON_ms) {
     const int32_t drifted = calm_drift(&sensor->drift, step->ms);
     sensor->level_Pa_q10 += drifted;
+    sensor->rests_Pa_q10 += drifted;
     condition->zero_Pa_q10[step->k] += drifted;
   }
-  const int32_t remainder = condition->zero_Pa_q10[step->k] - sensor->level_Pa_q10;
+  const int32_t remainder = condition->zero_Pa_q10[step->k] - sensor->rests_Pa_q10;
   int32_t *gone = &condition->faded_Pa_q10[step->k];
   *gone += part_of(remainder - *gone, share_in(step->ms, PAST_ms));
   condition->margin_Pa_q10[step->k] += *gone;
@@ -209,6 +221,7 @@ static void set_zero(const struct step *step, int32_t remainder_Pa_q10, int32_t 
   struct condition_sensor *sensor = step->sensor;
   const int32_t spread = sensor->spread_Pa_q10;
   condition->zero_Pa_q10[step->k] = sensor->level_Pa_q10 + remainder_Pa_q10;
+  follow_rest(step);
   sensor->wander_Pa_q10 = faded(sensor->wander_Pa_q10, step->wander_share) + level_moved_Pa_q10;
   sensor->taken_Pa_q10 = faded(sensor->taken_Pa_q10, step->wander_share) + moved_Pa_q10;
   sensor->crept_Pa_q10 = spread > 0 ? 0 : sensor->crept_Pa_q10;

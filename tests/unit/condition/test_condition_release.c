@@ -201,6 +201,21 @@ TEST(test_what_stands_off_at_a_touch_fades_in_the_contact) {
   }
 }
 
+/* Nor of what many presses left, which the level has followed. */
+TEST(test_what_many_presses_leave_fades_in_the_next_one) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    begin_calm(periods_us[i]);
+    for (int n = 0; n < 40; n++) {
+      press(20000 * Pa);
+      run_s(1);
+      release(0.03f, 3, 1.2f);
+    }
+    press(8000 * Pa);
+    run_s(12);
+    TEST_ASSERT_INT32_WITHIN(30 * Pa, 8000 * Pa, conditioned.pressure_Pa_q10[7]);
+  }
+}
+
 /* The sd of what rubber keeps: of a hold as it grows, of all that is let go, and then less in 3 s. A sensor that stood
  * off by a tenth counts for more from then on, one that did not for less. */
 TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
