@@ -187,6 +187,9 @@ static int32_t pulled_q14(int32_t ratio_x_q26, int32_t ratio_y_q26, int32_t sd_q
   return scaled_to_fixed(quotient_of(odds, sum_of(one, odds)), 14);
 }
 
+/* 0.05 mm, squared: what sensors' places and pads' ends move a location by. No residual shows it. */
+#define PLACE_SQUARE_Q26 167772
+
 /* The place is the mean of that of a contact that is pulled as estimated and of one that is not,
  * each by how likely it is. The standard deviation has what lies between the two. What it loses where nothing pulls is
  * of the same misfit as the place's: else what is left would be mostly the difference of the two factors. */
@@ -208,15 +211,16 @@ static void weigh_force(struct fit_tangential *found) {
   found->x_mm = fit_float(fit_fixed(found->x_mm, 20) - fixed_mul_16(dx_q20, not_pulled) * 4, -20);
   found->y_mm = fit_float(fit_fixed(found->y_mm, 20) - fixed_mul_16(dy_q20, not_pulled) * 4, -20);
   struct scaled variance = squares_of(fit_fixed(found->location_sd_mm, 20), 0, 20);
-  const struct scaled least = {variance.mantissa, variance.exponent - 4};
+  const struct scaled sixteenth = {variance.mantissa, variance.exponent - 4};
   struct scaled of_force = scaled_mul(squares_of(moved[0], moved[1], 20), squares_of(sd_q26, 0, 26));
   of_force = scaled_mul(of_force, squares_of(fit_fixed(found->place_per_pull, 20), 0, 20));
   of_force.mantissa = -of_force.mantissa;
   const struct scaled share = {not_pulled, -14}, other = {pulled, -14};
   const struct scaled between = scaled_mul(squares_of(dx_q20, dy_q20, 20), other);
   variance = sum_of(variance, scaled_mul(sum_of(between, of_force), share));
-  const bool small = sum_of(variance, (struct scaled){-least.mantissa, least.exponent}).mantissa < 0;
-  const struct scaled root = scaled_sqrt(small ? least : variance);
+  const bool small = sum_of(variance, (struct scaled){-sixteenth.mantissa, sixteenth.exponent}).mantissa < 0;
+  const struct scaled still = {PLACE_SQUARE_Q26 >> 4, 4 - 26};
+  const struct scaled root = scaled_sqrt(sum_of(small ? sixteenth : variance, still));
   found->location_sd_mm = fit_float(root.mantissa, root.exponent);
 }
 

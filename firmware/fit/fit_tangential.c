@@ -15,9 +15,12 @@
 
 /* Factors of the stated variances by chi^2. NUMERICS.md has their reasons ("What the firmware does not report"). */
 #define MISFIT_SHIFT_PULL 3   /* chi^2 / 8 of a tangential force: its degrees of freedom */
-#define MISFIT_SHIFT_PLACE 4  /* chi^2 / 16 of a location: by the coverage on rubber with a dip */
+#define MISFIT_SHIFT_PLACE 5  /* chi^2 / 32 of a location: by the coverage of calibrated pads */
 #define MISFIT_LEAST_Q16 6554 /* 0.1 */
-#define GAINS_SHIFT_PULL 1    /* half of the gains' part stays where chi^2 is small; of a location all */
+/* Of the gains' part stays where chi^2 is small: of a tangential force half; of a location all, or nothing after a
+ * calibration, which leaves no errors that rise over the pad. */
+#define GAINS_SHIFT_PULL 1
+#define GAINS_SHIFT_CALIBRATED 12
 
 /* Thickness of a layer in units of length: the widest term's sd is 0.478 of the thickness. On layers thinner than
  * the pitch standard deviations grow as (pitch / thickness)^2 (NUMERICS.md). */
@@ -288,7 +291,8 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   struct scaled pull_variance =
       scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PULL, GAINS_SHIFT_PULL));
   pull_variance = fit_scaled_short(pull_variance);
-  variance = scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PLACE, 0));
+  const int gains_shift = problem->own ? GAINS_SHIFT_CALIBRATED : 0;
+  variance = scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PLACE, gains_shift));
   variance = fit_scaled_short(variance);
   int32_t x_q8, y_q8;
   struct scaled pulls =

@@ -43,8 +43,6 @@ LIMITS = (
     ("loaded_valid_percent", 97, 100),
     ("q_cover_1sd", 65, 98),
     ("q_cover_2sd", 96, 100),
-    # Cautious where something pulls: half of the gains' part would leave 94 here, but of presses without a pull on pads that
-    # remember only 91 within two standard deviations (truth, over_time).
     ("location_cover_1sd", 60, 98),
     ("location_cover_2sd", 92, 100),
     ("force_p50_percent", 0.1, 0.6),
