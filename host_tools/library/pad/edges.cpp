@@ -59,14 +59,29 @@ public:
     std::fill_n(settings_.gain_sd_q16, FT_MAX_SENSORS, static_cast<std::uint16_t>(65536.0 * GAIN_SD));
   }
 
+  // A calibration on this block takes what its ends lack for a dip. How deep, if that is as wide as all of its dip.
+  void take_dip(const twin::BlockTable &block, const std::vector<twin::Place> &places) {
+    settings_.dip_sd_mm = 1e-3f * static_cast<float>(info_.calibration.dip_sd_um);
+    double products = 0.0, squares = 0.0;
+    for (const auto &[x_mm, y_mm] : places) {
+      for (std::size_t k = 0; k < info_.sensor_count; k++) {
+        const double away = std::hypot(of(info_.x_mm[k]) - x_mm, of(info_.y_mm[k]) - y_mm) / of(settings_.dip_sd_mm);
+        const double bell = layer_Pa(profile_, 0.0, 0.0, 0.0, 0.0) * std::exp(-0.5 * away * away);
+        products -= bell * block.added_Pa(k, {1.0, 0.0, 0.0, radius_mm()}, x_mm, y_mm);
+        squares += bell * bell;
+      }
+    }
+    settings_.dip_share =
+        static_cast<float>(std::clamp(products / squares, 0.0, info_.calibration.dip_share_q16 / 65536.0));
+  }
+
   // False: there is no estimate.
   bool of_contact(Contact &contact, const twin::BlockTable &block) {
     std::array<std::int32_t, FT_MAX_SENSORS> readings{};
-    const double radius_mm = std::sqrt(5.0 * of(profile_.spread_mm2)); // under Hertz's pressure
     for (std::size_t k = 0; k < info_.sensor_count; k++) {
       const double layer = FORCE_N * layer_Pa(profile_, contact.qx, contact.qy, of(info_.x_mm[k]) - contact.x_mm,
                                               of(info_.y_mm[k]) - contact.y_mm);
-      const twin::BlockTable::Load load{FORCE_N, contact.qx * FORCE_N, contact.qy * FORCE_N, radius_mm};
+      const twin::BlockTable::Load load{FORCE_N, contact.qx * FORCE_N, contact.qy * FORCE_N, radius_mm()};
       const double added = block.added_Pa(k, load, contact.x_mm, contact.y_mm);
       readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * (layer + added)));
     }
@@ -89,6 +104,8 @@ public:
   }
 
 private:
+  double radius_mm() const { return std::sqrt(5.0 * of(profile_.spread_mm2)); } // under Hertz's pressure
+
   const pad_profile &profile_;
   const wire_info &info_;
   fit_array array_{};
@@ -98,26 +115,26 @@ private:
 
 using Terms = Eigen::Vector3d;
 
+Terms row_at(const Contact &contact) {
+  const double u = contact.estimated_x_mm / of(PAD_EDGE_UNIT_mm);
+  const double v = contact.estimated_y_mm / of(PAD_EDGE_UNIT_mm);
+  return {1.0, u * u, v * v};
+}
+
 // Least squares of value_i = factor_i even(c) over contacts, by the estimated location.
 template <typename Factor, typename Value>
 Terms fitted(const std::vector<Contact> &contacts, const Factor &factor, const Value &value) {
   Eigen::MatrixXd rows(contacts.size(), PAD_EDGE_TERMS);
   Eigen::VectorXd right(contacts.size());
   for (std::size_t i = 0; i < contacts.size(); i++) {
-    const double u = contacts[i].estimated_x_mm / of(PAD_EDGE_UNIT_mm);
-    const double v = contacts[i].estimated_y_mm / of(PAD_EDGE_UNIT_mm);
     const auto row = static_cast<Eigen::Index>(i);
-    rows.row(row) = factor(contacts[i]) * Eigen::RowVector3d(1.0, u * u, v * v);
+    rows.row(row) = factor(contacts[i]) * row_at(contacts[i]).transpose();
     right[row] = value(contacts[i]);
   }
   return rows.colPivHouseholderQr().solve(right);
 }
 
-double even(const Terms &c, const Contact &contact) {
-  const double u = contact.estimated_x_mm / of(PAD_EDGE_UNIT_mm);
-  const double v = contact.estimated_y_mm / of(PAD_EDGE_UNIT_mm);
-  return c[0] + c[1] * u * u + c[2] * v * v;
-}
+double even(const Terms &c, const Contact &contact) { return c.dot(row_at(contact)); }
 
 // The members of a contact along one axis.
 struct Axis {
@@ -145,11 +162,7 @@ AxisTerms terms_along(const Axis &axis, const std::vector<Contact> &free, const 
   return terms;
 }
 
-void put(const Terms &terms, float (&to)[PAD_EDGE_TERMS]) {
-  for (int i = 0; i < PAD_EDGE_TERMS; i++) {
-    to[i] = static_cast<float>(terms[i]);
-  }
-}
+void put(const Terms &terms, float (&to)[PAD_EDGE_TERMS]) { Eigen::Vector3f::Map(to) = terms.cast<float>(); }
 
 double outermost(const float *places, int count) { return of(*std::max_element(places, places + count)); }
 
@@ -172,29 +185,40 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std:
   }
   const twin::Block rubber{twin::silicone(of(profile.thickness_mm)), half_x + overhang_mm, half_y + overhang_mm};
   const twin::BlockTable block = twin::BlockTable::load_or_build(rubber, sensors, cache_directory, on_progress);
-  std::vector<Contact> contacts[3]; // without load, pulled along x, along y
-  std::size_t places = 0;
+  std::vector<twin::Place> places;
   for (double x_mm = -half_x; x_mm <= half_x + 1e-9; x_mm += STEP_mm) {
     for (double y_mm = -half_y; y_mm <= half_y + 1e-9; y_mm += STEP_mm) {
-      places++;
-      for (int load = 0; load < 3; load++) {
-        Contact contact{x_mm, y_mm, load == 1 ? RATIO : 0.0, load == 2 ? RATIO : 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-        if (estimate.of_contact(contact, block)) {
-          contacts[load].push_back(contact);
-        }
+      places.push_back({x_mm, y_mm});
+    }
+  }
+  const bool calibrated = (info.stored & WIRE_STORED_CALIBRATION) != 0 && info.calibration.dip_share_q16 > 0;
+  if (calibrated) {
+    estimate.take_dip(block, places);
+  }
+  std::vector<Contact> contacts[3]; // without load, pulled along x, along y
+  double forces = 0.0;
+  for (const auto &[x_mm, y_mm] : places) {
+    for (int load = 0; load < 3; load++) {
+      Contact contact{x_mm, y_mm, load == 1 ? RATIO : 0.0, load == 2 ? RATIO : 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
+      if (estimate.of_contact(contact, block)) {
+        contacts[load].push_back(contact);
+        forces += load == 0 ? contact.estimated_force : 0.0;
       }
     }
   }
   for (const auto &some : contacts) {
-    if (static_cast<double>(some.size()) < LEAST_SHARE * static_cast<double>(places)) {
+    if (static_cast<double>(some.size()) < LEAST_SHARE * static_cast<double>(places.size())) {
       throw Error(ErrorCode::bad_value, "the rubber ends " + shortest(profile.overhang_mm) +
                                             " mm beyond the outer sensors, too near to estimate a tangential force");
     }
   }
   const AxisTerms x = terms_along(ALONG_X, contacts[0], contacts[1]);
   const AxisTerms y = terms_along(ALONG_Y, contacts[0], contacts[2]);
+  const double usual =
+      calibrated ? forces / static_cast<double>(contacts[0].size()) : 1.0; // in the calibration's scale
   const Terms force = fitted(
-      contacts[0], [](const Contact &) { return 1.0; }, [](const Contact &c) { return c.estimated_force - 1.0; });
+      contacts[0], [](const Contact &) { return 1.0; },
+      [&](const Contact &c) { return c.estimated_force / usual - 1.0; });
   pad_edges edges{};
   put(x.ratio, edges.ratio_x);
   put(y.ratio, edges.ratio_y);

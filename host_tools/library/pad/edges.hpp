@@ -21,10 +21,11 @@ namespace fingertip::pad {
 constexpr double EDGE_OVERHANG_MIN_mm = 3.0, EDGE_OVERHANG_MAX_mm = 20.0;
 
 // The coefficients of the pad of this profile, whose own edges count as none. The sensors of info
-// lie evenly about the origin. Solves the block, 2 to 30 s, unless the cache holds it; on_progress
-// gets the share done, 0..1. Throws Error where the overhang is out of range, the sensors are no
-// array that the estimate takes, or the edges leave it on less than half of the array; and as
-// twin::BlockTable does.
+// lie evenly about the origin. A calibration in it was made on this pad: it has taken part of what the ends do for a
+// dip and for its force scale, so the coefficients are of what is left, and of another calibration they are others.
+// Solves the block, 2 to 30 s, unless the cache holds it; on_progress gets the share done, 0..1. Throws Error where the
+// overhang is out of range, the sensors are no array that the estimate takes, or the edges leave it on less than half
+// of the array; and as twin::BlockTable does.
 pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std::filesystem::path &cache_directory,
                    const std::function<void(double)> &on_progress = {});
 

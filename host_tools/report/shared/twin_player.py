@@ -26,9 +26,9 @@ class TwinPlayer:
     def play(self, path, recording, seed, *more):
         run(self.player, "play", path, "-o", recording, "--overwrite", "--quiet", "--seed", seed, *more)
 
-    def accepts(self, recording, weight_N, commands):
+    def accepts(self, recording, weight_N, commands, *more):
         """Whether what it recorded of a weight's placements is a calibration. Then the file has the commands that bring what was found."""
-        command = [str(part) for part in (self.player, "calibrate", recording, "--force", weight_N, "-o", commands)]
+        command = [str(part) for part in (self.player, "calibrate", recording, "--force", weight_N, "-o", commands, *more)]
         judged = subprocess.run(command, capture_output=True, text=True)
         if judged.returncode and "not calibrated: " not in judged.stderr:
             raise InputError(judged.stderr.strip())

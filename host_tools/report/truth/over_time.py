@@ -40,7 +40,7 @@ class Pads(NamedTuple):
 
     effects: str
     layer_mm: float = 12
-    options: tuple = ()  # more of twin scenario
+    options: tuple = ()  # of the rubber: more of twin scenario, and known to the fingertip
     slope_deg: float = 0
     calibrated: bool = True
 
@@ -114,7 +114,7 @@ def calibrated(player, pads, seed):
         leans = ("--tangential", f"{math.tan(slope):.4f},{turn_deg:g}", "--force", f"{WEIGHT_N * math.cos(slope):.4f}") if slope else ()
         player.write(path, "placements", pads.effects, seed, PLACEMENTS_s, "--layer", pads.layer_mm, *pads.options, *leans)
         player.play(path, recording, seed, "--raw")
-        return commands.read_bytes() if player.accepts(recording, WEIGHT_N, commands) else None
+        return commands.read_bytes() if player.accepts(recording, WEIGHT_N, commands, *pads.options) else None
 
 
 def pressed(player, kind, seed, commands):

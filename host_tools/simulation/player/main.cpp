@@ -5,7 +5,9 @@
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
+#include "library/pad/edges.hpp"
 #include "library/pad/profile.hpp"
+#include "library/pad/table_file.hpp"
 #include "simulation/player/native_fingertip.h"
 #include "simulation/player/repeat.h"
 #include "simulation/player/scenario.hpp"
@@ -93,7 +95,7 @@ std::vector<wire_packet> commands_in(const std::string &path) {
 
 struct CalibrateOptions {
   std::string placements, commands;
-  double force_N = 0.0;
+  double force_N = 0.0, overhang_mm = 0.0;
   bool replace = false;
 };
 
@@ -115,7 +117,13 @@ int calibrate(const CalibrateOptions &options) {
   };
   write(command_calibrate(made, info.sensor_count));
   if (for_profile) {
-    write(command_pad(pad::profile_of({for_profile->shown_mm()}, info)));
+    pad_profile profile = pad::profile_of({for_profile->shown_mm(), options.overhang_mm}, info);
+    info.calibration = made;
+    info.stored |= WIRE_STORED_CALIBRATION;
+    if (options.overhang_mm > 0.0) {
+      profile.edges = pad::edges_of(profile, info, twin::default_cache_directory());
+    }
+    write(command_pad(profile));
   }
   file.finish();
   return 0;
@@ -409,6 +417,8 @@ int run(int argc, char **argv) {
   option(calibrater, "placements", calibrated.placements, "FILE.csv", "Recording of them, with --raw")->required();
   option(calibrater, "--force", calibrated.force_N, "N", "That weight, N")->required()->check(CLI::Range(0.1, 100.0));
   option(calibrater, "-o,--output", calibrated.commands, "FILE", "The commands")->required();
+  option(calibrater, "--overhang", calibrated.overhang_mm, "MM",
+         "Rubber beyond the outer sensors, as of fingertip pad");
   calibrater->add_flag("--overwrite", calibrated.replace, "Replace a file that exists");
 
   std::string capture;

@@ -290,6 +290,10 @@ void use_thickness(CalibratedDevice &device, const calibration &made,
     if (!other.empty()) {
       std::fprintf(stderr, "fingertip: %s; fingertip pad takes the one that was found\n", other.c_str());
     }
+    if (info.pad.overhang_mm > 0) {
+      std::printf("where the rubber ends, once more: fingertip pad --overhang %s\n",
+                  shortest(info.pad.overhang_mm).c_str());
+    }
   }
 }
 
