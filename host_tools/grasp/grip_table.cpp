@@ -9,14 +9,12 @@
 
 using namespace fingertip;
 
-namespace {
-
-std::string upper(std::string text) {
+static std::string upper(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
   return text;
 }
 
-void print_settings() {
+static void print_settings() {
   std::printf("\n\n@dataclasses.dataclass(frozen=True)\nclass Settings:\n"
               "    \"\"\"None: the default of the gripper. set_N chooses the mode that holds this force.\"\"\"\n\n");
   for (const GraspSetting &setting : grasp_settings()) {
@@ -25,7 +23,7 @@ void print_settings() {
   }
 }
 
-void print_traits() {
+static void print_traits() {
   std::printf(
       "\n\n@dataclasses.dataclass(frozen=True)\nclass Traits:\n"
       "    \"\"\"A gripper of two parallel fingers; lengths and speeds of the width between its pads.\"\"\"\n\n"
@@ -48,8 +46,6 @@ void print_traits() {
   }
   std::printf("}\n\"\"\"of the models that the tool drives\"\"\"\n");
 }
-
-} // namespace
 
 int main() {
   std::printf("\"\"\"Written by host_tools/grasp/grip_table.cpp; change the tables of host_tools/grasp.\"\"\"\n\n"

@@ -9,8 +9,6 @@
 
 namespace fingertip {
 
-namespace {
-
 using S = GripSettings;
 
 constexpr const char *FIXED = "fixed";
@@ -20,8 +18,6 @@ constexpr double CAP = 0.8, START = 0.33, FLOOR = 0.25;
 constexpr double GENTLE_mm_s = 4.0; // approach to what breaks
 
 [[noreturn]] void impossible(const std::string &text) { throw Error(ErrorCode::bad_value, text); }
-
-} // namespace
 
 #define OF(member) #member, [](S & s) -> double & { return s.member; }
 

@@ -4,8 +4,6 @@
 
 namespace fingertip {
 
-namespace {
-
 // All constants but those of the integral gain were chosen in simulated grasps (CONTROL.md).
 
 // The gripper's own force limit must be able to stay below the cap.
@@ -24,8 +22,6 @@ constexpr double FLOOR_N = 1.3, FLOOR_N_mm = 1.1, FLOOR_LEAST_N = 0.5;
 
 // A slow gripper needs a larger margin, because the load grows until it moves.
 constexpr double MARGIN = 1.05, MARGIN_1_s = 11.0, MARGIN_1_mm = 0.5, MARGIN_LEAST = 1.0;
-
-} // namespace
 
 GripSettings default_settings(const GripperTraits &traits) {
   GripSettings settings;

@@ -12,8 +12,6 @@ extern "C" {
 
 namespace fingertip {
 
-namespace {
-
 // A fingertip whose values stay the same to the last bit for this time and this number of frames is
 // stuck: noise changes them with every frame.
 constexpr double FROZEN_s = 0.05;
@@ -41,14 +39,14 @@ constexpr std::uint32_t OVER = CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER
 // of its force that lies on the pad counts. A block of 36 by 54 mm is such a plate.
 constexpr double WIDE_mm = 15.0, PAD_mm2 = 1400.0;
 
-double force_on_pad(const GripTouch &touch) {
+static double force_on_pad(const GripTouch &touch) {
   if ((touch.flags & CONTACT_FLAG_FIT_VALID) == 0 || touch.sigma_mm <= WIDE_mm) {
     return touch.force_N;
   }
   return touch.force_N * PAD_mm2 / (PAD_mm2 + 0.85 * 2.0 * M_PI * touch.sigma_mm * touch.sigma_mm);
 }
 
-bool force_is_valid(const GripTouch &touch) {
+static bool force_is_valid(const GripTouch &touch) {
   if ((touch.flags & CONTACT_FLAG_CONTACT) == 0) {
     return true; // the force is 0
   }
@@ -57,12 +55,10 @@ bool force_is_valid(const GripTouch &touch) {
           touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
 }
 
-bool is_same(const GripTouch &a, const GripTouch &b) {
+static bool is_same(const GripTouch &a, const GripTouch &b) {
   return a.force_N == b.force_N && a.force_sd_N == b.force_sd_N && a.x_mm == b.x_mm && a.y_mm == b.y_mm &&
          a.qx_N == b.qx_N && a.qy_N == b.qy_N;
 }
-
-} // namespace
 
 void GripFinger::take(const GripTouch &touch) {
   if (is_heard_ && touch.t_s <= touch_.t_s) {
@@ -207,13 +203,11 @@ double GripFinger::doubted_for_s(const GripReading &reading) const {
   return is_doubted_ ? reading.t_s - doubted_s_ : 0.0;
 }
 
-namespace {
-
 using Readings = std::array<GripReading, GRIP_FINGERS>;
 
 // Replaces a reading that is doubted by the last one that was believed, or leaves the fingertip out.
-void judge(std::array<GripFinger, GRIP_FINGERS> &fingers, Readings &readings, const GripSettings &settings,
-           const GripReach &reach) {
+static void judge(std::array<GripFinger, GRIP_FINGERS> &fingers, Readings &readings, const GripSettings &settings,
+                  const GripReach &reach) {
   std::array<bool, GRIP_FINGERS> explained{}, lasts{};
   for (std::size_t i = 0; i < fingers.size(); i++) {
     const GripReading &reading = readings[i], &before = fingers[i].believed();
@@ -250,8 +244,6 @@ void judge(std::array<GripFinger, GRIP_FINGERS> &fingers, Readings &readings, co
     }
   }
 }
-
-} // namespace
 
 GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s, const GripSettings &settings,
                               const GripReach *held) {

@@ -5,14 +5,10 @@
 
 namespace fingertip {
 
-namespace {
-
 // An error below this share of the effect of the gripper's least move is ignored: no move would
 // reduce it, and the gripper would oscillate. Settled rubber loses more force when the gripper opens
 // than it gains when the gripper closes, so the two shares differ.
 constexpr double CLOSES = 0.625, OPENS = 1.0;
-
-} // namespace
 
 std::uint32_t GripFixed::step(const GripReadings &readings, const GripSettings &settings, const GripperTraits &traits,
                               double now_s, GripReach &reach) {

@@ -5,8 +5,6 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr double READY_s = 0.15; // measurement of the zero of the load
 constexpr double RISES_s = 0.27; // rise of the start force
 // After a pause an approach or a release catches up on no more than this: a leap would be a blow.
@@ -32,9 +30,7 @@ constexpr double WIDTH_SLACK_mm = 1.0; // rounding of the gripper's own units
 constexpr double MARGIN_MOST = 100.0;
 constexpr double ONLY_HELD_s = 1.0; // without a load for this time
 
-double seconds(const GripperStatus &status) { return 1e-6 * static_cast<double>(status.host_us); }
-
-} // namespace
+static double seconds(const GripperStatus &status) { return 1e-6 * static_cast<double>(status.host_us); }
 
 Grip::Grip(const GripSettings &settings, const GripperTraits &traits)
     : settings_(settings), traits_(traits), reach_(traits) {}

@@ -5,8 +5,6 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr double FRICTION_LEAST = 0.08;
 // Above its latest peak the load and its rate are used as measured. Below the peak the object swings
 // on the rubber, or has begun to slide, and the mean is used.
@@ -37,9 +35,7 @@ constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
 constexpr double GROWN = 1.4;
 constexpr double MORE = 1.3; // factor on the grip of an object that slides without a known load
 
-double late_s(double delay_s) { return std::clamp(delay_s - SOON_s, 0.0, LATEST_s); }
-
-} // namespace
+static double late_s(double delay_s) { return std::clamp(delay_s - SOON_s, 0.0, LATEST_s); }
 
 void GripFriction::held(double ratio) { held_ = std::clamp(ratio, held_, MOST); }
 

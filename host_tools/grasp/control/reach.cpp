@@ -6,8 +6,6 @@
 
 namespace fingertip {
 
-namespace {
-
 // Layers of 12 mm under spheres of 6 to 30 mm, 1 to 10 N (host_tools/simulation/twin).
 constexpr double EXPONENT = 1.6;
 constexpr double STIFFER = 1.2; // safety factor on the stiffness that moves have shown, for the cap
@@ -39,26 +37,24 @@ constexpr int DETOURS_MOST = 4;
 constexpr double SDS = 2.5, SD_LEAST = 0.04, SD_MOST = 0.06;
 
 // Upper limit of the larger of both true forces.
-double most_N(const GripReadings &readings) {
+static double most_N(const GripReadings &readings) {
   return readings.high_N + SDS * std::clamp(readings.sd_N, SD_LEAST * readings.high_N, SD_MOST * readings.high_N);
 }
 
-double indentation_mm(double width_mm, double touch_mm) {
+static double indentation_mm(double width_mm, double touch_mm) {
   return std::max(touch_mm + TOUCHED_mm - width_mm, TOUCHED_mm);
 }
 
 // One pad's indentation at this force, by a power law.
-double way_to_mm(double force_N, double at_1_mm_N, double exponent) {
+static double way_to_mm(double force_N, double at_1_mm_N, double exponent) {
   return std::pow(force_N / at_1_mm_N, 1.0 / exponent);
 }
 
 // The pad's force at 1 mm, if this travel turned one force into the other.
-double shown_at_1_mm_N(double from_N, double to_N, double way_mm, double exponent) {
+static double shown_at_1_mm_N(double from_N, double to_N, double way_mm, double exponent) {
   const double unit_mm = way_to_mm(to_N, 1.0, exponent) - way_to_mm(from_N, 1.0, exponent);
   return std::pow(unit_mm / way_mm, exponent);
 }
-
-} // namespace
 
 void GripRubber::begin(double width_mm) {
   *this = GripRubber();

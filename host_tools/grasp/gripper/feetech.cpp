@@ -13,16 +13,12 @@ namespace fingertip {
 
 namespace feetech {
 
-namespace {
-
 constexpr std::size_t HEAD = 4; // FF FF id length
 constexpr std::uint8_t LEAST_LENGTH = 2;
 
-std::uint8_t checksum(Bytes::const_iterator from, Bytes::const_iterator to) {
+static std::uint8_t checksum(Bytes::const_iterator from, Bytes::const_iterator to) {
   return static_cast<std::uint8_t>(~std::accumulate(from, to, 0u));
 }
-
-} // namespace
 
 Bytes encoded(const Packet &packet) {
   const auto length = static_cast<std::uint8_t>(packet.parameters.size() + LEAST_LENGTH);
@@ -71,8 +67,6 @@ std::optional<Packet> take_packet(Bytes *bytes, std::size_t *skipped) {
 
 using namespace feetech;
 
-namespace {
-
 constexpr double COUNT_rad = 2 * std::numbers::pi / COUNTS_PER_TURN;
 constexpr double STALL_Nm = 1.9, FULL_SPEED_rad_s = 4.7; // 45 revolutions a minute, at 7.4 V
 constexpr double LEAST_TORQUE = 0.05;                    // of the stall's, below it does not turn
@@ -91,14 +85,12 @@ constexpr GripperUsual USUAL = {.slave = SLAVE,
 
 constexpr std::uint8_t STATUS_FROM = TORQUE_ENABLE;
 
-int word(const Bytes &bytes, std::size_t at) { return bytes[at] | bytes[at + 1] << 8; }
+static int word(const Bytes &bytes, std::size_t at) { return bytes[at] | bytes[at + 1] << 8; }
 
-void put_word(Bytes *bytes, int value) {
+static void put_word(Bytes *bytes, int value) {
   bytes->push_back(static_cast<std::uint8_t>(value & 0xFF));
   bytes->push_back(static_cast<std::uint8_t>(value >> 8));
 }
-
-} // namespace
 
 Jaw::Jaw(int closed_count, int open_count, double jaw_mm) : closed_(closed_count), open_(open_count), jaw_mm_(jaw_mm) {}
 

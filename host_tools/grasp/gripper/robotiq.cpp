@@ -34,8 +34,6 @@ Bytes with_crc(Bytes bytes) {
 
 using namespace robotiq;
 
-namespace {
-
 // The manuals ask for 5 ms between commands.
 constexpr std::chrono::milliseconds PAUSE{5};
 constexpr int RESET_READS = 10;
@@ -45,17 +43,17 @@ constexpr std::size_t HEAD = 2, CRC = 2; // slave and function
 constexpr GripperUsual USUAL = {
     .slave = SLAVE, .most_slave = 247, .closed_count = CLOSED_COUNT, .open_count = OPEN_COUNT, .most_count = 255};
 
-void put_word(Bytes *to, int value) {
+static void put_word(Bytes *to, int value) {
   to->push_back(static_cast<std::uint8_t>(value >> 8));
   to->push_back(static_cast<std::uint8_t>(value & 0xFF));
 }
 
-void put_range(Bytes *to, int address, int count) {
+static void put_range(Bytes *to, int address, int count) {
   put_word(to, address);
   put_word(to, count);
 }
 
-void put_values(Bytes *to, int count, const std::uint16_t *values) {
+static void put_values(Bytes *to, int count, const std::uint16_t *values) {
   to->push_back(static_cast<std::uint8_t>(2 * count));
   for (int i = 0; i < count; i++) {
     put_word(to, values[i]);
@@ -63,9 +61,9 @@ void put_values(Bytes *to, int count, const std::uint16_t *values) {
 }
 
 // Length of the answer to a read: the count of bytes, and the registers.
-std::size_t answer_length(int count) { return 1 + 2 * static_cast<std::size_t>(count); }
+static std::size_t answer_length(int count) { return 1 + 2 * static_cast<std::size_t>(count); }
 
-std::array<std::uint16_t, 3> registers_of(const Bytes &answer, int count) {
+static std::array<std::uint16_t, 3> registers_of(const Bytes &answer, int count) {
   std::array<std::uint16_t, 3> registers{};
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); i++) {
     registers[i] = static_cast<std::uint16_t>(answer[1 + 2 * i] << 8 | answer[2 + 2 * i]);
@@ -73,20 +71,18 @@ std::array<std::uint16_t, 3> registers_of(const Bytes &answer, int count) {
   return registers;
 }
 
-std::uint16_t share(double value, double least, double most) {
+static std::uint16_t share(double value, double least, double most) {
   const double clamped = std::clamp(value, least, most);
   return static_cast<std::uint16_t>(std::lround((clamped - least) / (most - least) * 255.0));
 }
 
-GripperWay robotiq_way(const GripperWay &given) {
+static GripperWay robotiq_way(const GripperWay &given) {
   const GripperWay way = complete(given, USUAL);
   if (way.open_count > way.closed_count) {
     throw Error(ErrorCode::bad_value, "the count of a Robotiq gripper grows while it closes");
   }
   return way;
 }
-
-} // namespace
 
 RobotiqGripper::RobotiqGripper(const GripperWay &given)
     : AskedLine(robotiq_way(given), BAUD), traits_(gripper_traits(given.model)) {

@@ -6,8 +6,6 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr double WINDOW_us = 30e6;
 constexpr std::size_t EXCHANGES = 512;
 /* Crystals are good to 100 ppm with all their errors, at both ends. */
@@ -18,7 +16,7 @@ constexpr double DRIFT_COST_us = 1.5e6;
 constexpr int STEPS = 40;
 
 /* Where a function that first rises and then falls is highest. */
-template <typename Function> double highest(double low, double high, Function value) {
+template <typename Function> static double highest(double low, double high, Function value) {
   for (int i = 0; i < STEPS; i++) {
     double a = low + (high - low) / 3;
     double b = high - (high - low) / 3;
@@ -32,7 +30,7 @@ template <typename Function> double highest(double low, double high, Function va
 }
 
 /* The last place on the way from inside to outside where the function is not negative. */
-template <typename Function> double edge(double inside, double outside, Function value) {
+template <typename Function> static double edge(double inside, double outside, Function value) {
   if (value(outside) >= 0) {
     return outside;
   }
@@ -42,8 +40,6 @@ template <typename Function> double edge(double inside, double outside, Function
   }
   return inside;
 }
-
-} // namespace
 
 double ClockEstimate::host_at(std::uint64_t other_device_us) const {
   auto passed_us = static_cast<double>(static_cast<std::int64_t>(other_device_us - device_us));

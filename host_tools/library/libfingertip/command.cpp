@@ -13,23 +13,21 @@
 
 namespace fingertip {
 
-namespace {
-
-wire_packet packet_of(wire_type type) {
+static wire_packet packet_of(wire_type type) {
   wire_packet packet;
   std::memset(&packet, 0, sizeof packet);
   packet.type = static_cast<std::uint8_t>(type);
   return packet;
 }
 
-std::string spoken(const Setting &setting) {
+static std::string spoken(const Setting &setting) {
   std::string name = setting.name;
   std::replace(name.begin(), name.end(), '_', ' ');
   return name;
 }
 
 /* The word of a choice; nullptr: there is no such choice, or people type its number. */
-const char *word_of(const SettingValue &value, double number) {
+static const char *word_of(const SettingValue &value, double number) {
   for (std::size_t i = 0; value.words && value.choices[i]; i++) {
     if (value.choices[i] == number) {
       return value.words[i];
@@ -38,7 +36,7 @@ const char *word_of(const SettingValue &value, double number) {
   return nullptr;
 }
 
-std::string value_text(const SettingValue &value, double number) {
+static std::string value_text(const SettingValue &value, double number) {
   if (const char *word = word_of(value, number)) {
     return word;
   }
@@ -47,7 +45,7 @@ std::string value_text(const SettingValue &value, double number) {
                        : shortest(static_cast<float>(number));
 }
 
-bool is_possible(const SettingValue &value, double number) {
+static bool is_possible(const SettingValue &value, double number) {
   if (!(number >= value.least && number <= value.most)) {
     return false;
   }
@@ -58,7 +56,7 @@ bool is_possible(const SettingValue &value, double number) {
   return !choice || *choice;
 }
 
-void check(const Setting &setting, const SettingValues &values, const std::string &shown) {
+static void check(const Setting &setting, const SettingValues &values, const std::string &shown) {
   for (std::size_t i = 0; i < setting.count; i++) {
     if (!is_possible(setting.values[i], values[i])) {
       throw Error(ErrorCode::bad_value, spoken(setting) + " " + shown + " is out of range; give " + setting.give);
@@ -66,7 +64,7 @@ void check(const Setting &setting, const SettingValues &values, const std::strin
   }
 }
 
-void put(wire_packet &command, const Setting &setting, const SettingValues &values) {
+static void put(wire_packet &command, const Setting &setting, const SettingValues &values) {
   const bool zeros = std::all_of(values.begin(), values.end(), [](double each) { return each == 0; });
   std::string shown;
   for (std::size_t i = 0; i < setting.count; i++) {
@@ -79,7 +77,7 @@ void put(wire_packet &command, const Setting &setting, const SettingValues &valu
 }
 
 /* In units of the packet, not yet rounded. */
-std::optional<double> number_of(const SettingValue &value, const std::string &text) {
+static std::optional<double> number_of(const SettingValue &value, const std::string &text) {
   if (value.words) {
     for (std::size_t i = 0; value.choices[i]; i++) {
       if (text == value.words[i]) {
@@ -99,7 +97,7 @@ std::optional<double> number_of(const SettingValue &value, const std::string &te
   return to_float(text);
 }
 
-SettingValues values_from_text(const Setting &setting, const std::string &text) {
+static SettingValues values_from_text(const Setting &setting, const std::string &text) {
   SettingValues values{};
   if (setting.zeros && text == setting.zeros) {
     return values;
@@ -130,8 +128,6 @@ SettingValues values_from_text(const Setting &setting, const std::string &text) 
   }
   return values;
 }
-
-} // namespace
 
 std::uint8_t possible_streams(const wire_info &info, std::uint8_t streams) {
   int missing = (info.capabilities & WIRE_CAPABILITY_FIT ? 0 : WIRE_STREAM_CONTACT) |

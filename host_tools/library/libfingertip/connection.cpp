@@ -12,23 +12,21 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr Session::Policy QUICK = {std::chrono::milliseconds(400), 3};
 
-const Found *with_serial(const std::vector<Found> &found, const std::string &serial) {
+static const Found *with_serial(const std::vector<Found> &found, const std::string &serial) {
   return find_in(found, [&](const Found &each) { return is_same_serial(each.serial, serial); });
 }
 
 /* Of the fingertip there. */
-std::string serial_of(const Way &way, const std::string &root) {
+static std::string serial_of(const Way &way, const std::string &root) {
   return text_field(ask(
                         way, [] { return false; }, root)
                         .serial);
 }
 
 /* Throws Error where there is none. */
-Way sure_way_to(const Found &found, Reach reach) {
+static Way sure_way_to(const Found &found, Reach reach) {
   if (auto way = way_to(found, reach)) {
     return *way;
   }
@@ -40,7 +38,7 @@ Way sure_way_to(const Found &found, Reach reach) {
 }
 
 /* Its serial number, or its port if that is unknown. */
-std::string name_of(const Found &found, Reach reach, const std::string &root) {
+static std::string name_of(const Found &found, Reach reach, const std::string &root) {
   if (!found.serial.empty()) {
     return found.serial;
   }
@@ -54,7 +52,7 @@ std::string name_of(const Found &found, Reach reach, const std::string &root) {
   return found.port;
 }
 
-Way only_one(const std::vector<Found> &found, Reach reach, const std::string &root, const std::string &none) {
+static Way only_one(const std::vector<Found> &found, Reach reach, const std::string &root, const std::string &none) {
   if (found.empty()) {
     const std::string boot_rom = find_boot_rom(root);
     throw Error(ErrorCode::no_fingertip, none + (boot_rom.empty() ? "" : ", but " + boot_rom));
@@ -67,7 +65,7 @@ Way only_one(const std::vector<Found> &found, Reach reach, const std::string &ro
   return sure_way_to(found[0], reach);
 }
 
-Way with_wanted_serial(const Choice &choice, const std::string &root) {
+static Way with_wanted_serial(const Choice &choice, const std::string &root) {
   Finds finds = find_fingertips(root);
   if (const Found *found = with_serial(finds.here, choice.device)) {
     return sure_way_to(*found, choice.reach);
@@ -100,7 +98,7 @@ Way with_wanted_serial(const Choice &choice, const std::string &root) {
 }
 
 /* Takes out the one that is shared from there; nothing: none. */
-std::string take_socket(std::vector<Shared> &shared, const std::string &serial, const std::string &port) {
+static std::string take_socket(std::vector<Shared> &shared, const std::string &serial, const std::string &port) {
   std::error_code none;
   std::string real_port = port.empty() ? "" : std::filesystem::canonical(port, none).string();
   auto at = std::find_if(shared.begin(), shared.end(), [&](const Shared &each) {
@@ -113,8 +111,6 @@ std::string take_socket(std::vector<Shared> &shared, const std::string &serial, 
   shared.erase(at);
   return socket;
 }
-
-} // namespace
 
 Finds find_fingertips(const std::string &root) {
   std::vector<Shared> shared = find_shared();

@@ -9,11 +9,7 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr std::chrono::milliseconds WRITE_TIMEOUT{1000};
-
-} // namespace
 
 bool unix_address(const std::string &path, sockaddr_un *address) {
   *address = {};

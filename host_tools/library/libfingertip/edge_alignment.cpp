@@ -6,8 +6,6 @@
 
 namespace fingertip {
 
-namespace {
-
 /* A stamp is right to half a microsecond, by rounding, and a few cycles. */
 constexpr std::int64_t STAMPS_us = 2;
 /* More frequent ties add no information, and cost a fit each. */
@@ -20,11 +18,9 @@ constexpr std::size_t EDGES = 256;
 constexpr double KNOT_us = 1e6;
 constexpr std::size_t KNOTS = 64;
 
-double place_of(const ClockEstimate &clock, double t_us) {
+static double place_of(const ClockEstimate &clock, double t_us) {
   return clock.host_us + (t_us - static_cast<double>(clock.device_us)) / (1 + clock.drift_ppm * 1e-6);
 }
-
-} // namespace
 
 void EdgeAlignment::clock(std::size_t device, const ClockEstimate &estimate) {
   members_[device].clock = estimate;

@@ -26,8 +26,6 @@ static_assert(int{FINGERTIP_TEXT_LENGTH} == int{WIRE_TEXT_BYTES});
 
 namespace fingertip::values {
 
-namespace {
-
 constexpr bool all_fit() {
   for (const Packet &packet : packets) {
     std::size_t sum = 0;
@@ -42,14 +40,14 @@ constexpr bool all_fit() {
 }
 static_assert(all_fit());
 
-thread_local std::string last_error;
+static thread_local std::string last_error;
 
-const Packet *find(std::uint8_t type) {
+static const Packet *find(std::uint8_t type) {
   return find_in(packets, [&](const Packet &each) { return each.type == type; });
 }
 
 /* Calls with a number of the kind's type. */
-template <typename Visitor> void visit_kind(Kind kind, const Visitor &visit) {
+template <typename Visitor> static void visit_kind(Kind kind, const Visitor &visit) {
   switch (kind) {
   case Kind::u16:
     return visit(std::uint16_t{});
@@ -68,7 +66,7 @@ template <typename Visitor> void visit_kind(Kind kind, const Visitor &visit) {
   }
 }
 
-double load(Kind kind, const std::uint8_t *from) {
+static double load(Kind kind, const std::uint8_t *from) {
   double value = 0;
   visit_kind(kind, [&](auto number) {
     std::memcpy(&number, from, sizeof number);
@@ -77,7 +75,7 @@ double load(Kind kind, const std::uint8_t *from) {
   return value;
 }
 
-void store(const Field &field, double value, std::uint8_t *to) {
+static void store(const Field &field, double value, std::uint8_t *to) {
   visit_kind(field.kind, [&](auto number) {
     using Number = decltype(number);
     if constexpr (std::is_integral_v<Number>) {
@@ -95,8 +93,6 @@ void store(const Field &field, double value, std::uint8_t *to) {
     std::memcpy(to, &number, sizeof number);
   });
 }
-
-} // namespace
 
 std::size_t count_of(std::uint8_t type) {
   const Packet *packet = find(type);

@@ -11,10 +11,7 @@ extern "C" {
 
 namespace fingertip {
 
-namespace {
-
 constexpr std::size_t SEQUENCE_AT = 2;
-} // namespace
 
 std::optional<Envelope> Envelope::opened(Bytes frame) {
   const std::size_t used = cobs_decode(frame.data(), frame.size());

@@ -37,21 +37,17 @@ std::string flags_text(std::uint32_t flags) {
   return joined(names, " ");
 }
 
-namespace {
-
-template <std::size_t count> const char *word_of(const words::Word (&all)[count], std::uint32_t value) {
+template <std::size_t count> static const char *word_of(const words::Word (&all)[count], std::uint32_t value) {
   const auto *found = find_in(all, [&](const words::Word &each) { return each.value == value; });
   return found ? found->word : nullptr;
 }
 
 template <std::size_t count>
-std::string bits_text(const words::Word (&all)[count], std::uint32_t bits, const char *none) {
+static std::string bits_text(const words::Word (&all)[count], std::uint32_t bits, const char *none) {
   const std::string text =
       joined(all, ",", [&](const words::Word &each) { return bits & each.value ? each.word : ""; });
   return text.empty() ? none : text;
 }
-
-} // namespace
 
 std::string command_name(std::uint8_t type) {
   const char *word = word_of(words::commands, type);

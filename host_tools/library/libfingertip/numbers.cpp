@@ -5,15 +5,13 @@
 
 namespace fingertip {
 
-namespace {
-
-template <typename Number, typename... Format> std::string written(Number value, Format... format) {
+template <typename Number, typename... Format> static std::string written(Number value, Format... format) {
   char buffer[400];
   auto result = std::to_chars(buffer, buffer + sizeof buffer, value, format...);
   return std::string(buffer, result.ptr);
 }
 
-template <typename Number> std::optional<Number> parsed(std::string_view text) {
+template <typename Number> static std::optional<Number> parsed(std::string_view text) {
   Number value{};
   auto result = std::from_chars(text.data(), text.data() + text.size(), value);
   if (result.ec != std::errc() || result.ptr != text.data() + text.size() || text.empty()) {
@@ -22,11 +20,9 @@ template <typename Number> std::optional<Number> parsed(std::string_view text) {
   return value;
 }
 
-template <typename Number> std::optional<Number> finite(std::optional<Number> value) {
+template <typename Number> static std::optional<Number> finite(std::optional<Number> value) {
   return value && std::isfinite(*value) ? value : std::nullopt;
 }
-
-} // namespace
 
 std::string shortest(float value) { return written(value); }
 

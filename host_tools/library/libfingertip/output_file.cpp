@@ -13,8 +13,6 @@
 
 namespace fingertip {
 
-namespace {
-
 namespace fs = std::filesystem;
 
 [[noreturn]] void fail(const std::string &path, int error) {
@@ -28,13 +26,11 @@ namespace fs = std::filesystem;
   }
 }
 
-fs::path without_links(const std::string &path) {
+static fs::path without_links(const std::string &path) {
   std::error_code error;
   fs::path plain = fs::weakly_canonical(fs::absolute(path, error), error);
   return error ? fs::path(path) : plain;
 }
-
-} // namespace
 
 void check_output(const std::string &path, bool replace) {
   std::string folder = fs::path(path).parent_path().string();

@@ -9,17 +9,13 @@ namespace fingertip {
 
 using namespace recording;
 
-namespace {
-
-template <typename ValueOf> std::string list_text(ValueOf value_of, std::size_t count) {
+template <typename ValueOf> static std::string list_text(ValueOf value_of, std::size_t count) {
   std::string text;
   for (std::size_t k = 0; k < count; k++) {
     text += (k ? " " : "") + shortest(value_of(k));
   }
   return text;
 }
-
-} // namespace
 
 std::string text_field(const char *field) { return std::string(field, strnlen(field, WIRE_TEXT_BYTES)); }
 

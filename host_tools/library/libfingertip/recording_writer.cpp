@@ -11,8 +11,6 @@ namespace fingertip {
 
 using namespace recording;
 
-namespace {
-
 /* A clock that goes back by more than packets overtake each other has begun again. */
 constexpr std::uint64_t RESTART_us = 1'000'000;
 /* The resolution of written times. */
@@ -20,7 +18,7 @@ constexpr double ROUNDING_us = 0.1;
 constexpr double CLOCK_INTERVAL_us = 1e6;
 
 /* The sum of the two largest. */
-template <typename Device, typename Bound> double two_largest(const std::vector<Device> &devices, Bound bound) {
+template <typename Device, typename Bound> static double two_largest(const std::vector<Device> &devices, Bound bound) {
   double largest = 0, second = 0;
   for (const Device &device : devices) {
     const double each = bound(device);
@@ -30,17 +28,15 @@ template <typename Device, typename Bound> double two_largest(const std::vector<
   return largest + second;
 }
 
-std::string edges_text(const EdgeCounter &edges) {
+static std::string edges_text(const EdgeCounter &edges) {
   return edges.edges() == 0
              ? ""
              : " edges=" + std::to_string(edges.edges()) + " edges_missing=" + std::to_string(edges.missing());
 }
 
-std::string clock_text(const ClockEstimate &clock) {
+static std::string clock_text(const ClockEstimate &clock) {
   return " drift_ppm=" + fixed(clock.drift_ppm, 3) + " uncertainty_us=" + fixed(clock.uncertainty_us, 1);
 }
-
-} // namespace
 
 RecordingWriter::RecordingWriter(std::unique_ptr<LineSink> file, const wire_info *info, std::uint8_t sensor_count,
                                  const Metadata &extra, bool raw_expected)

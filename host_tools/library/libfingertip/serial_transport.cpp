@@ -16,9 +16,7 @@
 
 namespace fingertip {
 
-namespace {
-
-Error open_error(const std::string &path, int error) {
+static Error open_error(const std::string &path, int error) {
   switch (error) {
   case ENOENT:
   case ENODEV:
@@ -38,13 +36,13 @@ Error open_error(const std::string &path, int error) {
 }
 
 /* Major numbers of Unix98 pseudo-terminals, Documentation/admin-guide/devices.txt of Linux. */
-bool is_pseudo_terminal(int fd) {
+static bool is_pseudo_terminal(int fd) {
   struct stat status;
   return fstat(fd, &status) == 0 && major(status.st_rdev) >= 136 && major(status.st_rdev) <= 143;
 }
 
 /* Or -1 and errno. */
-int open_port(const std::string &path) {
+static int open_port(const std::string &path) {
   struct stat status;
   if (stat(path.c_str(), &status) == 0 && S_ISSOCK(status.st_mode)) { /* simulated */
     std::error_code none;
@@ -73,9 +71,7 @@ int open_port(const std::string &path) {
   return fine ? fd : -1;
 }
 
-bool is_taken() { return errno == EBUSY || errno == EWOULDBLOCK; }
-
-} // namespace
+static bool is_taken() { return errno == EBUSY || errno == EWOULDBLOCK; }
 
 SerialTransport::SerialTransport(const std::string &path, std::function<std::string()> find_again)
     : DescriptorTransport(path), find_again_(std::move(find_again)) {

@@ -14,16 +14,12 @@
 
 namespace fingertip {
 
-namespace {
-
 /* Nothing can be waited for on a terminal that no program has open: it has to be asked. */
 constexpr std::chrono::milliseconds LOOK_INTERVAL{2};
 
-Error failure(const std::string &what) {
+static Error failure(const std::string &what) {
   return Error(ErrorCode::cannot_open, what + " (" + std::strerror(errno) + ")");
 }
-
-} // namespace
 
 ServedPort::ServedPort(const std::string &link) : link_(link) {
   char name[64];

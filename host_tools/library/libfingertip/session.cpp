@@ -7,13 +7,11 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr std::chrono::milliseconds POLL_INTERVAL{50};
 /* A fingertip does not answer a version that it does not speak: it is asked in these too. */
 constexpr int NEWER_VERSIONS = 2;
 
-ErrorCode refusal_code(std::uint8_t result) {
+static ErrorCode refusal_code(std::uint8_t result) {
   switch (result) {
   case WIRE_RESULT_UNKNOWN_COMMAND:
     return ErrorCode::unknown_command;
@@ -25,8 +23,6 @@ ErrorCode refusal_code(std::uint8_t result) {
     return ErrorCode::refused;
   }
 }
-
-} // namespace
 
 Session::Session(Transport &transport, std::function<bool()> stop) : transport_(transport), stop_(std::move(stop)) {}
 

@@ -4,10 +4,8 @@
 
 namespace fingertip {
 
-namespace {
-
 /* Length of the first character: 0 if it is none, or a control character. */
-std::size_t printable_length(std::string_view text) {
+static std::size_t printable_length(std::string_view text) {
   auto first = static_cast<unsigned char>(text[0]);
   if (first < 0x80) {
     return first >= 0x20 && first != 0x7F;
@@ -28,8 +26,6 @@ std::size_t printable_length(std::string_view text) {
   bool valid = code >= lowest[length] && code <= 0x10FFFF && (code < 0xD800 || code > 0xDFFF);
   return valid ? length : 0;
 }
-
-} // namespace
 
 std::vector<std::string_view> split(std::string_view text, char separator) {
   std::vector<std::string_view> parts;

@@ -14,8 +14,6 @@ extern "C" {
 
 namespace fingertip {
 
-namespace {
-
 constexpr std::size_t BLOCK_BYTES = 512;
 constexpr std::size_t HEAD_BYTES = 32;
 constexpr std::size_t PAGE_BYTES = 256;
@@ -28,7 +26,7 @@ constexpr std::uint32_t FLASH_BYTES = 2u << 20;
 constexpr char CHECKSUM_MARK[] = "CRC ";
 
 /* RP2040 datasheet 2.8.1.3.1. */
-std::uint32_t boot2_crc(const std::uint8_t *bytes, std::size_t length) {
+static std::uint32_t boot2_crc(const std::uint8_t *bytes, std::size_t length) {
   std::uint32_t crc = 0xFFFFFFFF;
   for (std::size_t i = 0; i < length; i++) {
     crc ^= static_cast<std::uint32_t>(bytes[i]) << 24;
@@ -40,7 +38,7 @@ std::uint32_t boot2_crc(const std::uint8_t *bytes, std::size_t length) {
 }
 
 /* What follows this mark up to a zero or a blank; cmake/write_build_info.cmake puts it there. */
-std::string after(const std::vector<std::uint8_t> &flash, const std::string &mark) {
+static std::string after(const std::vector<std::uint8_t> &flash, const std::string &mark) {
   auto at = std::search(flash.begin(), flash.end(), mark.begin(), mark.end());
   if (at == flash.end()) {
     return "";
@@ -49,8 +47,6 @@ std::string after(const std::vector<std::uint8_t> &flash, const std::string &mar
   auto end = std::find_if(at, flash.end(), [](std::uint8_t c) { return c <= ' ' || c > '~'; });
   return std::string(at, end);
 }
-
-} // namespace
 
 FirmwareImage firmware_of(const std::string &name, std::vector<std::uint8_t> file) {
   FirmwareImage image;

@@ -8,7 +8,6 @@
 #include <cstdio>
 
 namespace fingertip::twin {
-namespace {
 
 // To be raised whenever a solution changes.
 constexpr int VERSION = 1;
@@ -18,7 +17,7 @@ constexpr double STEP_mm = 0.5;
 // for Hertz's pressure, 0.5 if even, 0.67 under a stiff flat end.
 constexpr double SPREAD = 0.5;
 
-std::string key_of(const Block &block, const std::vector<Place> &places) {
+static std::string key_of(const Block &block, const std::vector<Place> &places) {
   const BlockGrid grid;
   char text[256];
   std::snprintf(text, sizeof text, "block-table %d: %.9g %.9g %.9g %.9g grid %d %.9g %.9g %.9g %.9g step %.9g at",
@@ -33,11 +32,9 @@ std::string key_of(const Block &block, const std::vector<Place> &places) {
 }
 
 // On a line from -half to half.
-Cubic between(double place, double half, int nodes) {
+static Cubic between(double place, double half, int nodes) {
   return cubic_at((std::clamp(place / half, -1.0, 1.0) + 1.0) * 0.5 * (nodes - 1), nodes);
 }
-
-} // namespace
 
 BlockTable::BlockTable(const Block &block, const std::vector<Place> &sensors) : block_(block) {
   for (const Place &sensor : sensors) {

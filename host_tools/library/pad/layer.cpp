@@ -3,7 +3,6 @@
 #include <cmath>
 
 namespace fingertip::twin {
-namespace {
 
 constexpr double SHORE_A = 15.0;
 constexpr double POISSON = 0.49;
@@ -13,12 +12,10 @@ constexpr double H_LARGE = 300.0;
 constexpr double H_SMALL = 1e-4;
 
 // The denominator of T, W and Q.
-double denominator(double H, double poisson) {
+static double denominator(double H, double poisson) {
   const double cosh = std::cosh(H), b = 1.0 - 2.0 * poisson;
   return (3.0 - 4.0 * poisson) * cosh * cosh + H * H + b * b;
 }
-
-} // namespace
 
 double youngs_modulus_Pa(double shore_a) {
   return 1e6 * 0.0981 * (56.0 + 7.62336 * shore_a) / (0.137505 * (254.0 - 2.54 * shore_a));

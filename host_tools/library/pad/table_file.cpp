@@ -11,17 +11,14 @@
 #include <utility>
 
 namespace fingertip::twin {
-namespace {
 
-std::uint64_t fnv1a(const void *data, std::size_t length) {
+static std::uint64_t fnv1a(const void *data, std::size_t length) {
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (std::size_t i = 0; i < length; i++) {
     hash = (hash ^ static_cast<const unsigned char *>(data)[i]) * 0x100000001b3u;
   }
   return hash;
 }
-
-} // namespace
 
 // A file holds the key, the values, and a hash of both.
 TableFile::TableFile(const std::filesystem::path &directory, const std::string &name, std::string key)

@@ -13,8 +13,6 @@ extern "C" {
 
 namespace fingertip {
 
-namespace {
-
 using std::chrono::seconds;
 
 constexpr Hub::Client OURSELVES = 0;
@@ -27,7 +25,7 @@ const std::map<std::uint8_t, std::uint8_t> ANSWER_OF = {
     {WIRE_CMD_INFO, WIRE_INFO}, {WIRE_CMD_HEALTH, WIRE_HEALTH}, {WIRE_CMD_CRASH, WIRE_CRASH}};
 constexpr std::size_t ACK_COMMAND_AT = 0, ACK_RESULT_AT = 1, ACK_SEQUENCE_AT = 2;
 
-std::optional<wire_packet> decoded(const Envelope &packet) {
+static std::optional<wire_packet> decoded(const Envelope &packet) {
   Bytes frame;
   packet.append_frame(frame);
   wire_packet decoded;
@@ -36,8 +34,6 @@ std::optional<wire_packet> decoded(const Envelope &packet) {
   }
   return decoded;
 }
-
-} // namespace
 
 Hub::Client Hub::join() {
   clients_[++last_client_];

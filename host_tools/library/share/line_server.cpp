@@ -12,16 +12,12 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr std::size_t LONGEST_LINE = 200, MOST_CLIENTS = 16;
 
-void put(int client, const std::string &line) {
+static void put(int client, const std::string &line) {
   const std::string whole = line + "\n"; // the socket's room is many lines
   (void)!send(client, whole.data(), whole.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
-
-} // namespace
 
 LineServer::LineServer(const std::string &path, Clients clients) : path_(path), about_(std::move(clients)) {
   sockaddr_un address;

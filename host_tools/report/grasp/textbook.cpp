@@ -8,12 +8,9 @@ extern "C" {
 #include <cmath>
 
 namespace fingertip::grasp {
-namespace {
 
 constexpr double FIRST_N = 2.0, TOUCH_N = 0.15, MOST_N = 20.0, MARGIN = 1.3, SLID = 1.3;
 constexpr double APPROACH_mm_s = 8.0, STIFFNESS_N_mm = 3.0, MOVES_s = 0.1, STANDS_s = 0.2;
-
-} // namespace
 
 void Textbook::approach(double now_s, double low_N) {
   const double step_mm = traits_.step_mm;

@@ -7,7 +7,6 @@ extern "C" {
 #include <cmath>
 
 namespace fingertip::cell {
-namespace {
 
 using Kind = Fault::Kind;
 
@@ -16,7 +15,7 @@ constexpr double WRONG_mm = 10.0; // of the location
 constexpr double BOOTS_s = 1.5, MOVED_N = 1.5, LESS = 0.3, SPIKE_N = 10.0, GATE_N = 0.05;
 
 // Less than a contact's least force is none.
-GripTouch less_by(GripTouch touch, double force_N, double qx_N, double qy_N) {
+static GripTouch less_by(GripTouch touch, double force_N, double qx_N, double qy_N) {
   touch.force_N -= force_N;
   touch.qx_N -= qx_N;
   touch.qy_N -= qy_N;
@@ -27,8 +26,6 @@ GripTouch less_by(GripTouch touch, double force_N, double qx_N, double qy_N) {
   }
   return touch;
 }
-
-} // namespace
 
 void Faults::watch(double t_s, std::uint8_t state) {
   if (state == fault_.state && std::isinf(begins_s_)) {

@@ -5,16 +5,12 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr double LEAST_FORCE_N = 1e-3; // that takes up the backlash
 
 // The servo's: one degree on a jaw of 100 mm, as users of such arms report.
 constexpr double SERVO_BACKLASH_mm = 1.75;
 // From the reset to gSTA 3 with both ends searched for; no figure is public.
 constexpr double ROBOTIQ_ACTIVATION_s = 2.0;
-
-} // namespace
 
 GripperMechanics gripper_mechanics(const std::string &model) {
   GripperMechanics mechanics;

@@ -5,8 +5,6 @@
 
 namespace fingertip {
 
-namespace {
-
 using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::chrono::milliseconds FRAME_GAP{20}; // what is no whole frame by then is none
@@ -14,8 +12,6 @@ constexpr double BITS_PER_BYTE = 10;
 // While a machine stalls for longer, the gripper's time stops: no command could have reached it.
 constexpr double STALL_s = 0.1;
 constexpr double LONGEST_STEP_s = 0.01; // of the motion
-
-} // namespace
 
 const std::vector<std::pair<std::string, LineFault>> &line_faults() {
   static const std::vector<std::pair<std::string, LineFault>> all = {

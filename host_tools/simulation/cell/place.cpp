@@ -22,7 +22,6 @@
 #include <utility>
 
 namespace fingertip::cell {
-namespace {
 
 namespace fs = std::filesystem;
 
@@ -30,8 +29,6 @@ constexpr const char *SERIALS[SIDES.size()] = {"00000000000CE110", "00000000000C
 constexpr std::chrono::milliseconds LOOK_INTERVAL{10};
 constexpr std::int64_t ROW_us = 2'000;
 constexpr std::size_t ROWS_BYTES = 4096;
-
-} // namespace
 
 volatile std::sig_atomic_t interrupted = 0;
 

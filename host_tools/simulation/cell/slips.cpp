@@ -3,11 +3,8 @@
 #include <algorithm>
 
 namespace fingertip::cell {
-namespace {
 
 constexpr double MORE_FORCE = 1.05, JOINED_s = 0.03, AFTER_s = 1.0;
-
-} // namespace
 
 void Slips::sample(double t_s, bool slides, double force_N, double slid_mm, double least_N) {
   if (slides) {

@@ -14,7 +14,6 @@
 #include <sstream>
 
 namespace fingertip {
-namespace {
 
 constexpr double PRESSURE_LIMIT_Pa = 1e7;
 constexpr double TEMPERATURE_LIMIT_degC = 1e3;
@@ -23,21 +22,19 @@ constexpr std::size_t TRUTHS = std::size(TRUTH);
 /* After the sensors, in any order. */
 constexpr const char *OPTIONAL[] = {"Qx_N", "Qy_N", "temperature_degC"};
 
-std::string trimmed(const std::string &text) {
+static std::string trimmed(const std::string &text) {
   const std::size_t first = text.find_first_not_of(" \t\r");
   return first == std::string::npos ? std::string() : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
 /* Not finite where it is no number. */
-double number(const char *begin, const char *end) {
+static double number(const char *begin, const char *end) {
   double value = std::nan("");
   const auto [stop, error] = std::from_chars(begin, end, value);
   return error == std::errc() && stop == end ? value : std::nan("");
 }
 
-double number(const std::string &text) { return number(text.data(), text.data() + text.size()); }
-
-} // namespace
+static double number(const std::string &text) { return number(text.data(), text.data() + text.size()); }
 
 Scenario::Scenario(const std::string &path) {
   std::ifstream file(path);

@@ -4,14 +4,11 @@
 #include <cmath>
 
 namespace fingertip::twin {
-namespace {
 
 constexpr double REACH = 3.0; // thicknesses
 constexpr int STEPS = 24;     // from the middle to there
 constexpr int FORCES = 33;
 constexpr double FORCE_MIN_N = ContactTable::FORCE_MIN_N, FORCE_MAX_N = ContactTable::FORCE_MAX_N;
-
-} // namespace
 
 BestGaussian::BestGaussian(const ContactTable &table, double layer_mm) {
   const double step_mm = REACH * layer_mm / STEPS;

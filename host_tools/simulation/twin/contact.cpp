@@ -8,7 +8,6 @@
 #include <string>
 
 namespace fingertip::twin {
-namespace {
 
 constexpr double FINE_STEP_mm = 0.25, STEP_mm = 0.5;
 // Wider ones press a wider area: the base cannot resolve the finer step.
@@ -18,8 +17,6 @@ constexpr double ROOM_THICKNESSES = 3.0;
 constexpr int STEPS_MAX = 2000;
 // Change of the pressure in one step, relative to the force.
 constexpr double SETTLED = 1e-7;
-
-} // namespace
 
 Grid grid_for(const Indenter &indenter, const Layer &layer) {
   const double half_mm = std::max(TABLE_REACH_mm, indenter.reach_mm()) + ROOM_THICKNESSES * layer.thickness_mm;

@@ -5,7 +5,6 @@
 #include <string>
 
 namespace fingertip::twin {
-namespace {
 
 constexpr int FORCES = ForcePlanes::FORCES, NODES = ForcePlanes::NODES;
 constexpr double STEP_mm = ForcePlanes::STEP_mm;
@@ -15,7 +14,7 @@ constexpr std::size_t VALUES = FORCES * PLANE;
 constexpr int VERSION = 1;
 
 // All that the numbers depend on.
-std::string key_of(const Indenter &indenter, const Layer &layer, const Grid &grid) {
+static std::string key_of(const Indenter &indenter, const Layer &layer, const Grid &grid) {
   char text[256];
   std::snprintf(text, sizeof text,
                 "contact-table %d: %d %.9g %.9g %.9g %.9g %.9g on %.9g %.9g %.9g grid %d %.9g "
@@ -26,8 +25,6 @@ std::string key_of(const Indenter &indenter, const Layer &layer, const Grid &gri
                 STEP_mm, NODES);
   return text;
 }
-
-} // namespace
 
 double ContactTable::base_pressure_Pa(double force_N, double dx_mm, double dy_mm, double dip_share) const {
   double pressure_Pa = base_pressure_Pa(force_N, dx_mm, dy_mm);

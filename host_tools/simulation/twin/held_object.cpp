@@ -5,11 +5,8 @@
 #include <limits>
 
 namespace fingertip::twin {
-namespace {
 
 constexpr double mN_PER_N = 1e3; // and mm/s2 per m/s2
-
-} // namespace
 
 double mindlin(double share) { return 1.0 - std::pow(1.0 - share, 1.5); }
 

@@ -6,30 +6,29 @@
 #include <stdexcept>
 
 namespace fingertip::twin {
-namespace {
 
 constexpr double NOTHING_mm = std::numeric_limits<double>::infinity();
 // Printed parts have no sharper edges, and a sharp one would ask for infinite pressure.
 constexpr double EDGE_mm = 0.4;
 
 // Quarter of a circle of this radius, from flat to upright; `in` counts from where it begins.
-double rounding(double in, double radius) {
+static double rounding(double in, double radius) {
   if (in <= 0.0) {
     return 0.0;
   }
   return in < radius ? radius - std::sqrt(radius * radius - in * in) : NOTHING_mm;
 }
 
-Indenter sphere(const std::string &name, double d, const std::string &description, double E = 0.0) {
+static Indenter sphere(const std::string &name, double d, const std::string &description, double E = 0.0) {
   return {name, description, Indenter::Shape::sphere, d, d, d, 0.0, E};
 }
 
-Indenter flat(Indenter::Shape shape, const std::string &name, double size, double edge,
-              const std::string &description) {
+static Indenter flat(Indenter::Shape shape, const std::string &name, double size, double edge,
+                     const std::string &description) {
   return {name, description, shape, size, size, 0.0, edge, 0.0};
 }
 
-std::vector<Indenter> make() {
+static std::vector<Indenter> make() {
   using Shape = Indenter::Shape;
   std::vector<Indenter> all{
       sphere("sphere6", 6, "small spherical indenter, 6 mm"),
@@ -53,8 +52,6 @@ std::vector<Indenter> make() {
   }
   return all;
 }
-
-} // namespace
 
 double Indenter::profile_mm(double x_mm, double y_mm) const {
   const double x = std::abs(x_mm), y = std::abs(y_mm);

@@ -14,7 +14,6 @@ extern "C" {
 #include <numeric>
 
 namespace fingertip::twin {
-namespace {
 
 constexpr int GRID_PLACES_X = 3, GRID_PLACES_Y = 7;
 constexpr double SLIP_WAY_mm = 24.0, SLIP_SPAN_mm = 28.0;
@@ -23,10 +22,10 @@ constexpr std::array<double, 5> SLIP_SPEEDS_mm_s{20, 50, 100, 150, 200}; // the 
 constexpr std::array<double, 3> ROLL_SPEEDS_mm_s{10, 25, 50};
 constexpr std::array<double, 7> DISTANCES_mm{6, 9, 12, 15, 18, 24, 30};
 
-std::string number(double value) { return shortest(static_cast<float>(value)); }
+static std::string number(double value) { return shortest(static_cast<float>(value)); }
 
 // Press, hold and let go at one place.
-Episode press(const std::string &name, Place place, double force_N, double ramp_s, double hold_s) {
+static Episode press(const std::string &name, Place place, double force_N, double ramp_s, double hold_s) {
   Episode episode;
   episode.press = name;
   Track track = track_at(place);
@@ -37,7 +36,7 @@ Episode press(const std::string &name, Place place, double force_N, double ramp_
 
 // The functions below make the nth episode of a kind.
 
-Episode grid(const Stage &stage, std::size_t n) {
+static Episode grid(const Stage &stage, std::size_t n) {
   struct Way {
     const char *name;
     double ramp_s, hold_s;
@@ -63,7 +62,7 @@ Episode grid(const Stage &stage, std::size_t n) {
   return episode;
 }
 
-Episode random_press(const Stage &stage, std::size_t n, const std::string &name, double ramp_s, double hold_s) {
+static Episode random_press(const Stage &stage, std::size_t n, const std::string &name, double ramp_s, double hold_s) {
   Random random(stage.options.seed, TAPS, n);
   const Place place = stage.random_place(random);
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
@@ -71,17 +70,17 @@ Episode random_press(const Stage &stage, std::size_t n, const std::string &name,
   return press(name, place, force_N, ramps_s, hold_s);
 }
 
-Episode tap(const Stage &stage, std::size_t n) { return random_press(stage, n, "tap", 0.12, 0.3); }
+static Episode tap(const Stage &stage, std::size_t n) { return random_press(stage, n, "tap", 0.12, 0.3); }
 
-Episode hold(const Stage &stage, std::size_t n) {
+static Episode hold(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, HOLD, n);
   return random_press(stage, n, "hold", 0.2, milliseconds(random.log_uniform(0.2, 10.0)));
 }
 
-Episode high(const Stage &stage, std::size_t n) { return random_press(stage, n, "hold", 0.5, 0.6); }
+static Episode high(const Stage &stage, std::size_t n) { return random_press(stage, n, "hold", 0.5, 0.6); }
 
 // A weight is set down by hand, rests by itself and is lifted.
-Episode placement(const Stage &stage, std::size_t n) {
+static Episode placement(const Stage &stage, std::size_t n) {
   constexpr double RESTS_s = 2.0;
   Random random(stage.options.seed, PLACEMENTS, n);
   const Place place = stage.random_place(random);
@@ -90,7 +89,7 @@ Episode placement(const Stage &stage, std::size_t n) {
 }
 
 // A poke by hand: never at rest, and not quite at one place.
-Episode poke(const Stage &stage, std::size_t n) {
+static Episode poke(const Stage &stage, std::size_t n) {
   constexpr double WANDER_mm = 1.5;
   Random random(stage.options.seed, POKES, n);
   Episode episode;
@@ -116,7 +115,7 @@ Episode poke(const Stage &stage, std::size_t n) {
 }
 
 // Slow enough that only what does not depend on the rate makes a loop, save relaxation.
-Episode cycle(const Stage &stage, std::size_t n) {
+static Episode cycle(const Stage &stage, std::size_t n) {
   constexpr double RAMP_s = 15.0;
   Random random(stage.options.seed, CYCLE, n);
   const Place place = n == 0 ? Place{0.0, 0.0} : stage.random_place(random);
@@ -132,7 +131,7 @@ Episode cycle(const Stage &stage, std::size_t n) {
 }
 
 // When the pusher's way, which never falls, first is this long; whole milliseconds.
-double time_of(const Profile &way, double length_mm, double begin_s, double end_s) {
+static double time_of(const Profile &way, double length_mm, double begin_s, double end_s) {
   double low = begin_s, high = end_s;
   while (high - low > 1e-4) {
     const double middle = 0.5 * (low + high);
@@ -141,7 +140,7 @@ double time_of(const Profile &way, double length_mm, double begin_s, double end_
   return milliseconds(high);
 }
 
-Episode slip(const Stage &stage, std::size_t n) {
+static Episode slip(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, SLIP, n);
   const bool upward = random.uniform(0.0, 1.0) < 0.5;
   const double slack_mm = 0.5 * (SLIP_SPAN_mm - SLIP_WAY_mm);
@@ -168,7 +167,7 @@ Episode slip(const Stage &stage, std::size_t n) {
   return episode;
 }
 
-Episode twist(const Stage &stage, std::size_t n) {
+static Episode twist(const Stage &stage, std::size_t n) {
   constexpr double TURN_deg = 90.0;
   Random random(stage.options.seed, TWIST, n);
   Episode episode;
@@ -187,7 +186,7 @@ Episode twist(const Stage &stage, std::size_t n) {
   return episode;
 }
 
-double outermost(const float *places_mm) {
+static double outermost(const float *places_mm) {
   double most = 0.0;
   for (std::size_t k = 0; k < geometry.sensor_count; k++) {
     most = std::max(most, std::abs(static_cast<double>(places_mm[k])));
@@ -195,12 +194,12 @@ double outermost(const float *places_mm) {
   return most;
 }
 
-double half_width_mm(const ScenarioOptions &options) {
+static double half_width_mm(const ScenarioOptions &options) {
   return options.overhang_mm ? outermost(geometry.x_mm) + *options.overhang_mm : PAD_HALF_WIDTH_mm;
 }
 
 // The contact rolls across the pad's long edge, until nothing of it is left on the pad.
-Episode rolloff(const Stage &stage, std::size_t n) {
+static Episode rolloff(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, ROLLOFF, n);
   Episode episode;
   episode.press = "roll";
@@ -219,7 +218,7 @@ Episode rolloff(const Stage &stage, std::size_t n) {
   return episode;
 }
 
-Episode two(const Stage &stage, std::size_t n) {
+static Episode two(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, TWO, n);
   const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
   // The far ones lie along the pad, which is too narrow for them.
@@ -236,14 +235,14 @@ Episode two(const Stage &stage, std::size_t n) {
 
 constexpr const char *USUAL_MASS_kg = "0.1..0.5"; // assumed
 
-void check(const char *option, double value, double lowest, double highest) {
+static void check(const char *option, double value, double lowest, double highest) {
   if (!(value >= lowest && value <= highest)) {
     throw Error(std::string(option) + " " + number(value) + " is out of range; give " + number(lowest) + " to " +
                 number(highest));
   }
 }
 
-void check_slide(const ScenarioOptions &options, double friction) {
+static void check_slide(const ScenarioOptions &options, double friction) {
   const Range mass_kg("--mass", options.mass_kg);
   for (double end : {mass_kg.lowest, mass_kg.highest}) {
     check("--mass", end, 0.01, 5.0);
@@ -257,7 +256,7 @@ void check_slide(const ScenarioOptions &options, double friction) {
 }
 
 // What shows all that differs but the seeds, the length and the kind's own settings.
-std::string name_of(const ScenarioOptions &options) {
+static std::string name_of(const ScenarioOptions &options) {
   std::string name = options.kind + "-" + options.indenter;
   name += "-h" + number(options.layer_mm);
   if (options.overhang_mm) {
@@ -280,8 +279,6 @@ std::string name_of(const ScenarioOptions &options) {
   }
   return name;
 }
-
-} // namespace
 
 const std::vector<ScenarioKind> &scenario_kinds() {
   static const std::vector<ScenarioKind> all{

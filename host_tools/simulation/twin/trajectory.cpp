@@ -8,17 +8,14 @@
 #include <stdexcept>
 
 namespace fingertip::twin {
-namespace {
 
 constexpr double STICKS = 0.8; // of each period of stick-slip
 
 // 0 to 1 from rest to rest.
-double smooth_step(double u) {
+static double smooth_step(double u) {
   const double v = std::clamp(u, 0.0, 1.0);
   return v * v * (3.0 - 2.0 * v);
 }
-
-} // namespace
 
 void Profile::add(double seconds, double to, double rate_from, double rate_to) {
   const double begin_s = end_s();

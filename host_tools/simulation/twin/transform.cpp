@@ -5,23 +5,20 @@
 #include <mutex>
 
 namespace fingertip::twin {
-namespace {
 
 // Planning in FFTW is not safe in several threads.
-std::mutex planning;
+static std::mutex planning;
 
-void multiply(fftw_complex &wave, double by) {
+static void multiply(fftw_complex &wave, double by) {
   wave[0] *= by;
   wave[1] *= by;
 }
 
-void multiply(fftw_complex &wave, const std::complex<double> &by) {
+static void multiply(fftw_complex &wave, const std::complex<double> &by) {
   const std::complex<double> product = by * std::complex<double>(wave[0], wave[1]);
   wave[0] = product.real();
   wave[1] = product.imag();
 }
-
-} // namespace
 
 struct Transform::Plans {
   double *real;

@@ -4,16 +4,13 @@
 #include <cstdlib>
 
 namespace fingertip::measure {
-namespace {
 
-thread_local std::string last_failure;
+static thread_local std::string last_failure;
 
-std::vector<Record> &records() {
+static std::vector<Record> &records() {
   static std::vector<Record> all;
   return all;
 }
-
-} // namespace
 
 bool list_record(Record record) {
   for (const Record &other : records()) {

@@ -13,13 +13,12 @@ extern "C" {
 #include <limits>
 
 namespace fingertip::calibrating {
-namespace {
 
 constexpr double Q10 = 1024.0;
 
-std::string percent(double share) { return fixed(100.0 * share, 1) + " %"; }
+static std::string percent(double share) { return fixed(100.0 * share, 1) + " %"; }
 
-double mean_zero_Pa(const Frame &frame) {
+static double mean_zero_Pa(const Frame &frame) {
   double sum_Pa = 0.0, count = 0.0;
   for (std::size_t k = 0; k < frame.zero_Pa.size(); k++) {
     sum_Pa += frame.valid >> k & 1u ? frame.zero_Pa[k] : 0.0;
@@ -28,15 +27,13 @@ double mean_zero_Pa(const Frame &frame) {
   return count > 0.0 ? sum_Pa / count : 0.0;
 }
 
-std::uint16_t micrometres(double length_mm) {
+static std::uint16_t micrometres(double length_mm) {
   return static_cast<std::uint16_t>(std::lround(std::clamp(1000.0 * length_mm, 0.0, 65535.0)));
 }
 
-std::int16_t to_both_sides(double value, int greatest) {
+static std::int16_t to_both_sides(double value, int greatest) {
   return static_cast<std::int16_t>(std::lround(std::clamp(value, double(-greatest), double(greatest))));
 }
-
-} // namespace
 
 Array array_of(const wire_info &info) {
   Array array;

@@ -6,7 +6,6 @@
 #include <utility>
 
 namespace fingertip::calibrating {
-namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
@@ -18,7 +17,7 @@ constexpr double COST_SETTLED = 1e-10; /* relative */
 constexpr double SEEN_BEFORE = 4.0;
 constexpr double CAPPED = 4.0; /* sds: one odd placement is weak evidence on the others */
 
-double largest_Pa(const Placement &placement) {
+static double largest_Pa(const Placement &placement) {
   double largest_Pa = 0.0;
   for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
     largest_Pa = placement.usable >> k & 1u ? std::max(largest_Pa, placement.reading_Pa[k]) : largest_Pa;
@@ -27,7 +26,7 @@ double largest_Pa(const Placement &placement) {
 }
 
 /* A reading's part of the normal matrix: of the global unknowns, of these and the placement's own, and of its own. */
-void accumulate(const Reading &r, double weight, MatrixXd &global, MatrixXd &cross, LocalSquare &local) {
+static void accumulate(const Reading &r, double weight, MatrixXd &global, MatrixXd &cross, LocalSquare &local) {
   for (const auto &[a, by_a] : r.terms) {
     for (const auto &[b, by_b] : r.terms) {
       global(a, b) += weight * by_a * by_b;
@@ -36,8 +35,6 @@ void accumulate(const Reading &r, double weight, MatrixXd &global, MatrixXd &cro
   }
   local += weight * r.by_local * r.by_local.transpose();
 }
-
-} // namespace
 
 double huber(double square) {
   return square <= HUBER * HUBER ? square : 2.0 * HUBER * std::sqrt(square) - HUBER * HUBER;

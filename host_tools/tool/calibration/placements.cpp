@@ -4,7 +4,6 @@
 #include <cmath>
 
 namespace fingertip::calibrating {
-namespace {
 
 constexpr double SLOT_s = 0.05;
 constexpr double GAP_s = 0.5;
@@ -22,8 +21,6 @@ constexpr double SLOTS_MIN = 5.0;
 constexpr double NOISE_Pa = 11.0, NOISE_SDS = 4.0;
 /* The largest of fifteen rms of ten readings is hardly ever beyond this many times the noise. */
 constexpr double SWAY_NOISES = 2.5;
-
-} // namespace
 
 PlacementFinder::PlacementFinder(std::size_t sensors) : sensors_(sensors) { restart(); }
 

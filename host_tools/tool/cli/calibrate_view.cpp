@@ -8,8 +8,6 @@
 
 namespace fingertip {
 
-namespace {
-
 using calibrating::GainSession;
 using calibrating::Judgement;
 
@@ -18,7 +16,7 @@ constexpr double FULL_Pa = 20000.0;
 constexpr int TEXT_COLUMNS = 44;
 constexpr std::chrono::milliseconds REDRAW{40};
 
-Canvas draw(const GainSession &session, int columns, int rows) {
+static Canvas draw(const GainSession &session, int columns, int rows) {
   Canvas canvas(columns, rows);
   const calibrating::Array &array = session.array();
   const Judgement *judgement = session.placements().empty() ? nullptr : &session.judgement();
@@ -74,8 +72,6 @@ Canvas draw(const GainSession &session, int columns, int rows) {
   canvas.text(text_left, rows - 1, "q quit   u take the last one back", text_style(FAINT));
   return canvas;
 }
-
-} // namespace
 
 CalibrateView::CalibrateView(ColourMode mode) {
   if (auto depth = screen_depth(mode)) {

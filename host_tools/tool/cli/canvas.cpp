@@ -6,14 +6,10 @@
 
 namespace fingertip {
 
-namespace {
-
-std::size_t character_length(std::string_view text) {
+static std::size_t character_length(std::string_view text) {
   auto first = static_cast<unsigned char>(text[0]);
   return std::min<std::size_t>(first < 0x80 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4, text.size());
 }
-
-} // namespace
 
 Colour mix(Colour a, Colour b, float part) {
   part = std::clamp(part, 0.0f, 1.0f);

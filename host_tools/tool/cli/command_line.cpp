@@ -13,13 +13,11 @@
 
 namespace fingertip {
 
-namespace {
-
 /* The letters of a word that may be mistyped: two that change places count as two. */
 constexpr std::size_t letters_mistyped(std::size_t letters) { return letters < 6 ? 1 : 2; }
 
 /* Letters to put in, take out or change, to make one word of the other; many for long words. */
-std::size_t letters_apart(const std::string &one, const std::string &other) {
+static std::size_t letters_apart(const std::string &one, const std::string &other) {
   std::array<std::size_t, 32> row;
   if (other.size() >= row.size()) {
     return row.size();
@@ -37,8 +35,9 @@ std::size_t letters_apart(const std::string &one, const std::string &other) {
 }
 
 template <typename Value>
-CLI::Option *with_choice(CLI::App *command, const std::string &option, const std::map<std::string, Value> &values,
-                         const std::string &allowed, Value &value, const std::string &help) {
+static CLI::Option *with_choice(CLI::App *command, const std::string &option,
+                                const std::map<std::string, Value> &values, const std::string &allowed, Value &value,
+                                const std::string &help) {
   return command->add_option_function<std::string>(
       option,
       [=, &value](const std::string &text) {
@@ -50,8 +49,6 @@ CLI::Option *with_choice(CLI::App *command, const std::string &option, const std
       },
       help);
 }
-
-} // namespace
 
 CommandLine::CommandLine(const std::string &description, const std::string &version) : app_(description, "fingertip") {
   app_.set_version_flag("--version", [version] {

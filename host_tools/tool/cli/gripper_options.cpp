@@ -6,9 +6,7 @@
 
 namespace fingertip {
 
-namespace {
-
-std::string only_port() {
+static std::string only_port() {
   const std::vector<GripperPort> ports = find_gripper_ports();
   if (ports.size() == 1) {
     return ports.front().path;
@@ -21,8 +19,6 @@ std::string only_port() {
                        ? "no serial port on USB is here; name the gripper's with --port (of grasp, --gripper-port)"
                        : "choose one with --port (of grasp, --gripper-port):" + names);
 }
-
-} // namespace
 
 void with_gripper_line(CLI::App *command, GripperWay &way) {
   with_value(command, "N", "--slave", way.slave, "Its address on the line; default: 9, of a servo 6");

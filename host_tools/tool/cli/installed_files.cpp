@@ -13,13 +13,9 @@ namespace fingertip {
 
 namespace fs = std::filesystem;
 
-namespace {
-
-std::optional<fs::path> find_page() {
+static std::optional<fs::path> find_page() {
   return find_installed({"../share/fingertip/web/index.html", "../../web/page/index.html"});
 }
-
-} // namespace
 
 fs::path this_program() {
   std::error_code none;

@@ -2,8 +2,6 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr char ESCAPE = '\x1b';
 /* The bytes of a sequence come together, over a slow serial line too: 50 ms at 300 baud are more
  * than one character. What comes later than that after an escape is a key. */
@@ -13,8 +11,6 @@ constexpr std::chrono::milliseconds READING{300};
 constexpr std::chrono::milliseconds PATIENCE{10000};
 /* ECMA-48: parameter and intermediate bytes are below these, finals from it on. */
 constexpr char FINAL_FIRST = '@', FINAL_LAST = '~';
-
-} // namespace
 
 void KeyParser::feed(const char *bytes, std::size_t length, HostTime now) {
   if (state_ != State::plain && now - last_ > SEQUENCE_GAP) {

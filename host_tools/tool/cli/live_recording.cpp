@@ -8,10 +8,8 @@
 
 namespace fingertip {
 
-namespace {
-
-RecordingWriter writer_of(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready,
-                          const std::string &port, std::int64_t host_zero_us, const Metadata &extra) {
+static RecordingWriter writer_of(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready,
+                                 const std::string &port, std::int64_t host_zero_us, const Metadata &extra) {
   Metadata head = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"started_utc", utc_now()}};
   std::vector<wire_info> infos;
   for (const DeviceNews &each : ready) {
@@ -31,8 +29,6 @@ RecordingWriter writer_of(const std::string &path, bool overwrite, const std::ve
   }
   return RecordingWriter(std::move(lines), &infos[0], infos[0].sensor_count, head, both);
 }
-
-} // namespace
 
 std::string utc_now() {
   auto now = wall_now();

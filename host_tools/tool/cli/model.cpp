@@ -6,8 +6,6 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr std::uint64_t RATE_SPAN_us = 1000000;
 constexpr std::uint64_t TRAIL_SPAN_us = 1000000;
 constexpr std::uint64_t SLIP_SHOWN_us = 150000;
@@ -15,11 +13,9 @@ constexpr std::uint64_t SLIP_SHOWN_us = 150000;
 /* The head's keys for what a view shows. */
 constexpr const char *CAP_KEY = "grasp_cap", *GRIPPER_KEY = "grasp_gripper";
 
-bool is_controlled(std::uint8_t state) {
+static bool is_controlled(std::uint8_t state) {
   return state == GRIP_SQUEEZE || state == GRIP_READY || (state >= GRIP_HOLDING && state <= GRIP_HANDING);
 }
-
-} // namespace
 
 void Model::take(const wire_packet &packet) {
   switch (packet.type) {

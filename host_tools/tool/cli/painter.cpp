@@ -6,10 +6,8 @@
 
 namespace fingertip {
 
-namespace {
-
 /* The 6 x 6 x 6 cube of the xterm palette, entries 16 to 231, and its greys, 232 to 255. */
-int palette_index(Colour colour) {
+static int palette_index(Colour colour) {
   constexpr int levels[6] = {0, 95, 135, 175, 215, 255};
   auto nearest = [&](int value) {
     int best = 0;
@@ -34,18 +32,18 @@ constexpr const char *UPPER_HALF = "▀";
 constexpr const char *LOWER_HALF = "▄";
 
 /* U+2800 to U+28FF: dots in four rows. */
-bool is_braille(const std::string &character) {
+static bool is_braille(const std::string &character) {
   return character.size() == 3 && character[0] == '\xE2' && (static_cast<unsigned char>(character[1]) & 0xFC) == 0xA0;
 }
 
-char ascii_of_braille(const std::string &character) {
+static char ascii_of_braille(const std::string &character) {
   unsigned dots =
       (static_cast<unsigned char>(character[1]) & 3u) << 6 | (static_cast<unsigned char>(character[2]) & 0x3Fu);
   constexpr unsigned upper = 0x1B, lower = 0xE4; /* two rows each */
   return dots & upper ? (dots & lower ? ':' : '\'') : dots & lower ? '.' : ' ';
 }
 
-char ascii_of(const std::string &character) {
+static char ascii_of(const std::string &character) {
   static const std::map<std::string, char> nearest = {
       {"─", '-'}, {"│", '|'}, {"┤", '|'}, {"╌", '-'}, {"┼", '+'}, {"╭", '+'},  {"╮", '+'},  {"╰", '+'}, {"╯", '+'},
       {"●", '*'}, {"○", 'o'}, {"·", '.'}, {"×", 'x'}, {"σ", 's'}, {"µ", 'u'},  {"±", '~'},  {"≥", '>'}, {"←", '<'},
@@ -56,7 +54,7 @@ char ascii_of(const std::string &character) {
 }
 
 /* From dark to bright. */
-std::string shade(Colour colour, Characters characters) {
+static std::string shade(Colour colour, Characters characters) {
   constexpr const char *shades[] = {" ", "░", "▒", "▓", "█"};
   constexpr const char *ascii[] = {" ", ".", ":", "+", "#"};
   /* Weights of ITU-R BT.601 in tenths; the pad's own colour is below the first step. */
@@ -65,7 +63,7 @@ std::string shade(Colour colour, Characters characters) {
   return characters == Characters::ascii ? ascii[step] : shades[step];
 }
 
-void append_colour(std::string &codes, int plane, std::int32_t colour, bool truecolour) {
+static void append_colour(std::string &codes, int plane, std::int32_t colour, bool truecolour) {
   codes += (codes.empty() ? "" : ";");
   if (colour < 0) {
     codes += std::to_string(plane + 9);
@@ -76,8 +74,6 @@ void append_colour(std::string &codes, int plane, std::int32_t colour, bool true
     codes += std::to_string(plane + 8) + ";5;" + std::to_string(colour);
   }
 }
-
-} // namespace
 
 std::int32_t Painter::code(const std::optional<Colour> &colour) const {
   if (!colour || depth_ == ColourDepth::none) {

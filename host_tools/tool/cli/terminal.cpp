@@ -17,16 +17,14 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr std::chrono::milliseconds OUTPUT_WAIT{100}; /* between two checks for a stop */
 
-volatile std::sig_atomic_t stop_signal = 0;
-std::atomic<unsigned> interrupt_count{0}; /* the handler may run in several threads */
-volatile std::sig_atomic_t end_signal = 0;
-volatile std::sig_atomic_t suspend_signal = 0;
+static volatile std::sig_atomic_t stop_signal = 0;
+static std::atomic<unsigned> interrupt_count{0}; /* the handler may run in several threads */
+static volatile std::sig_atomic_t end_signal = 0;
+static volatile std::sig_atomic_t suspend_signal = 0;
 
-void on_stop(int signal) {
+static void on_stop(int signal) {
   stop_signal = signal;
   if (signal == SIGINT) {
     interrupt_count++;
@@ -34,15 +32,15 @@ void on_stop(int signal) {
     end_signal = signal;
   }
 }
-void on_suspend(int signal) { suspend_signal = signal; }
+static void on_suspend(int signal) { suspend_signal = signal; }
 
-void handle(int signal, void (*handler)(int)) {
+static void handle(int signal, void (*handler)(int)) {
   struct sigaction action = {};
   action.sa_handler = handler;
   sigaction(signal, &action, nullptr);
 }
 
-void write_all(const std::string &text) {
+static void write_all(const std::string &text) {
   std::size_t at = 0;
   while (at < text.size()) {
     ssize_t count = write(STDOUT_FILENO, text.data() + at, text.size() - at);
@@ -57,7 +55,7 @@ void write_all(const std::string &text) {
   }
 }
 
-winsize window() {
+static winsize window() {
   winsize size = {};
   if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0 || size.ws_row == 0) {
     size.ws_col = 80;
@@ -65,8 +63,6 @@ winsize window() {
   }
   return size;
 }
-
-} // namespace
 
 void catch_signals() {
   handle(SIGINT, on_stop);

@@ -9,19 +9,17 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr unsigned FIRST_INTERRUPT = 16;
 /* What an exception leaves in lr (ARMv6-M B1.5.8) */
 constexpr std::uint32_t EXC_RETURN_MIN = 0xfffffff0;
 
-std::string hex_text(std::uint32_t value) {
+static std::string hex_text(std::uint32_t value) {
   char text[16];
   std::snprintf(text, sizeof text, "0x%08x", static_cast<unsigned>(value));
   return text;
 }
 
-std::string duration_text(double seconds) {
+static std::string duration_text(double seconds) {
   return seconds < 10          ? fixed(seconds, 2) + " s"
          : seconds < 120       ? fixed(seconds, 0) + " s"
          : seconds < 7200      ? fixed(seconds / 60, 0) + " min"
@@ -29,7 +27,7 @@ std::string duration_text(double seconds) {
                                : fixed(seconds / 86400, 1) + " days";
 }
 
-std::string exception_text(unsigned number) {
+static std::string exception_text(unsigned number) {
   if (number < FIRST_INTERRUPT) {
     return number == 3 ? "the fault handler" : "exception " + std::to_string(number);
   }
@@ -45,7 +43,7 @@ std::string exception_text(unsigned number) {
   return text;
 }
 
-std::string activity_text(unsigned activity) {
+static std::string activity_text(unsigned activity) {
   static constexpr const char *names[] = {"starting",
                                           "at rest",
                                           "obeying commands",
@@ -59,17 +57,17 @@ std::string activity_text(unsigned activity) {
   return activity < std::size(names) ? names[activity] : "doing " + std::to_string(activity);
 }
 
-std::string stuck_text(unsigned stuck) {
+static std::string stuck_text(unsigned stuck) {
   static constexpr std::pair<unsigned, const char *> names[] = {
       {CRASH_STUCK_MAIN, "the main loop"}, {CRASH_STUCK_SCAN, "the scan of the sensors"}, {CRASH_STUCK_USB, "USB"}};
   return joined(names, " and ", [&](const auto &each) { return stuck & each.first ? each.second : ""; });
 }
 
-std::string place_text(std::uint32_t address, const std::string &place) {
+static std::string place_text(std::uint32_t address, const std::string &place) {
   return place.empty() ? hex_text(address) : place + " (" + hex_text(address) + ")";
 }
 
-std::string at_text(const Crash &crash) {
+static std::string at_text(const Crash &crash) {
   const crash_record &record = crash.record;
   if (record.pc == 0 && record.sp == 0) {
     return "";
@@ -79,13 +77,13 @@ std::string at_text(const Crash &crash) {
          (is_call ? ", called from " + place_text(record.lr & ~1u, crash.caller) : "");
 }
 
-std::string where_text(const crash_record &record) {
+static std::string where_text(const crash_record &record) {
   return record.exception == 0
              ? ", in the main loop, " + activity_text(record.activity)
              : ", in " + exception_text(record.exception) + ", the main loop " + activity_text(record.activity);
 }
 
-std::string event_text(unsigned code, unsigned detail) {
+static std::string event_text(unsigned code, unsigned detail) {
   const std::string in_a_second = " (" + std::to_string(detail) + " in a second)";
   const std::pair<unsigned, std::string> texts[] = {
       {CRASH_EVENT_START, "started"},
@@ -101,8 +99,6 @@ std::string event_text(unsigned code, unsigned detail) {
   const auto *found = find_in(texts, [&](const auto &each) { return each.first == code; });
   return found ? found->second : "event " + std::to_string(code) + "." + std::to_string(detail);
 }
-
-} // namespace
 
 std::string crash_text(const Crash &crash) {
   const crash_record &record = crash.record;

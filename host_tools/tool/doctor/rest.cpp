@@ -9,17 +9,15 @@
 
 namespace fingertip {
 
-namespace {
-
 constexpr unsigned MEANS = 10;
 /* The middle of fewer is moved by one of them. */
 constexpr std::size_t COMPANY_MIN = 5;
 /* The median of |x| of a Gaussian of standard deviation 1 is 1 / 1.4826; a step holds two noises. */
 constexpr double NOISE_OF_MEDIAN_STEP = 1.4826 / 1.41421356;
 
-bool has(std::uint32_t bitmap, unsigned sensor) { return (bitmap >> sensor & 1u) != 0; }
+static bool has(std::uint32_t bitmap, unsigned sensor) { return (bitmap >> sensor & 1u) != 0; }
 
-double median(std::vector<double> values) {
+static double median(std::vector<double> values) {
   auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -28,7 +26,7 @@ double median(std::vector<double> values) {
 using Means = std::array<std::optional<double>, MEANS>;
 
 /* Least squares; nothing of fewer than three. */
-std::optional<Slope> slope(const Means &means, double seconds) {
+static std::optional<Slope> slope(const Means &means, double seconds) {
   std::vector<std::pair<double, double>> points; /* time and mean */
   double t = 0, y = 0;
   for (unsigned i = 0; i < MEANS; i++) {
@@ -53,8 +51,6 @@ std::optional<Slope> slope(const Means &means, double seconds) {
   }
   return Slope{ty / tt, std::sqrt(squares / (n - 2) / tt)};
 }
-
-} // namespace
 
 void RestMeter::add(const wire_packet &packet) {
   if (packet.type == WIRE_SYNC) {

@@ -13,12 +13,11 @@
 
 namespace fingertip {
 
-namespace {
-
 /* An assembler's label without a size reaches to the next function, but no farther than this. */
 constexpr std::uint32_t UNSIZED_MAX_bytes = 4096;
 
-template <typename Part> Part part_at(const std::vector<std::uint8_t> &file, std::size_t at, const std::string &name) {
+template <typename Part>
+static Part part_at(const std::vector<std::uint8_t> &file, std::size_t at, const std::string &name) {
   Part part;
   if (at > file.size() || file.size() - at < sizeof part) {
     throw Error(name + ": is cut short; give the ELF file of this firmware");
@@ -26,8 +25,6 @@ template <typename Part> Part part_at(const std::vector<std::uint8_t> &file, std
   std::memcpy(&part, file.data() + at, sizeof part);
   return part;
 }
-
-} // namespace
 
 Symbols Symbols::of_file(const std::string &path) {
   if (std::filesystem::is_directory(path)) {

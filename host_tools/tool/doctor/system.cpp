@@ -11,15 +11,13 @@
 
 namespace fingertip {
 
-namespace {
-
 namespace fs = std::filesystem;
 
 /* udev(7), and where a local cmake --install puts it. */
 constexpr const char *RULE_FOLDERS[] = {"etc/udev/rules.d", "run/udev/rules.d", "usr/local/lib/udev/rules.d",
                                         "usr/lib/udev/rules.d", "lib/udev/rules.d"};
 
-bool is_of_our_ports(const std::string &line) {
+static bool is_of_our_ports(const std::string &line) {
   char vendor[32], product[32];
   std::snprintf(vendor, sizeof vendor, "{idVendor}==\"%04x\"", FINGERTIP_USB_VID);
   std::snprintf(product, sizeof product, "{idProduct}==\"%04x\"", FINGERTIP_USB_PID);
@@ -27,7 +25,7 @@ bool is_of_our_ports(const std::string &line) {
          line.find(vendor) != std::string::npos && line.find(product) != std::string::npos;
 }
 
-bool holds(const fs::path &descriptors, dev_t device, bool *readable) {
+static bool holds(const fs::path &descriptors, dev_t device, bool *readable) {
   std::error_code error;
   fs::directory_iterator all(descriptors, error);
   if (error) {
@@ -39,8 +37,6 @@ bool holds(const fs::path &descriptors, dev_t device, bool *readable) {
     return stat(descriptor.path().c_str(), &status) == 0 && S_ISCHR(status.st_mode) && status.st_rdev == device;
   });
 }
-
-} // namespace
 
 std::string find_rule(const std::string &root) {
   for (const char *folder : RULE_FOLDERS) {

@@ -4,15 +4,11 @@
 
 namespace fingertip {
 
-namespace {
-
-std::string address_text(unsigned address) {
+static std::string address_text(unsigned address) {
   char text[8];
   std::snprintf(text, sizeof text, "0x%02x", address);
   return text;
 }
-
-} // namespace
 
 std::string pin_text(unsigned gpio) {
   /* GP0 and GP1 are pins 1 and 2; from there every fifth pin is a ground. */

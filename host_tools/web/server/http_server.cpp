@@ -15,8 +15,6 @@
 
 namespace fingertip {
 
-namespace {
-
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
@@ -28,14 +26,14 @@ constexpr int BACKLOG = 4096, AT_ONCE = 64;
 constexpr int SENT_AHEAD_BYTES = 65536; /* the kernel's memory for one that does not read; it doubles this */
 constexpr unsigned ESTABLISHED = 1;     /* in the kernel's tables of connections */
 
-std::string small_letters(std::string_view text) {
+static std::string small_letters(std::string_view text) {
   std::string small(text);
   std::transform(small.begin(), small.end(), small.begin(), [](unsigned char c) { return std::tolower(c); });
   return small;
 }
 
 /* 0, or the status of what is wrong. text: up to the empty line, without it. */
-int read_head(std::string_view text, HttpRequest *request, bool *stays) {
+static int read_head(std::string_view text, HttpRequest *request, bool *stays) {
   std::vector<std::string_view> lines = split(text, '\n');
   for (std::string_view &line : lines) {
     if (!line.empty() && line.back() == '\r') {
@@ -65,8 +63,6 @@ int read_head(std::string_view text, HttpRequest *request, bool *stays) {
   *stays = words[2] == "HTTP/1.1" && small_letters(request->header("connection")) != "close";
   return 0;
 }
-
-} // namespace
 
 std::string HttpRequest::header(const std::string &name) const {
   const auto found = headers.find(name);

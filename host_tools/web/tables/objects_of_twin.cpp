@@ -6,13 +6,12 @@
 #include "simulation/twin/traction_table.hpp"
 
 namespace fingertip::web {
-namespace {
 
 using twin::ForcePlanes;
 using Symmetry = ForcePlanes::Symmetry;
 
 // pressure_Pa(force_N, x_mm, y_mm) at the file's nodes.
-template <typename Pressure> ForcePlanes coarser(const Pressure &pressure_Pa, Symmetry in_x, Symmetry in_y) {
+template <typename Pressure> static ForcePlanes coarser(const Pressure &pressure_Pa, Symmetry in_x, Symmetry in_y) {
   std::vector<float> values;
   for (int f = 0; f < ForcePlanes::FORCES; f++) {
     const double force_N = ForcePlanes::force_at(f);
@@ -26,7 +25,7 @@ template <typename Pressure> ForcePlanes coarser(const Pressure &pressure_Pa, Sy
   return {std::move(values), in_x, in_y, ObjectsFile::STEP_mm, ObjectsFile::NODES};
 }
 
-Object object_of(const std::string &name, const std::filesystem::path &cache) {
+static Object object_of(const std::string &name, const std::filesystem::path &cache) {
   const twin::Layer layer = twin::silicone(PAD_mm);
   const auto table = twin::ContactTable::load_or_build(twin::indenter(name), layer, cache);
   const twin::TractionTable traction(table, layer);
@@ -49,8 +48,6 @@ Object object_of(const std::string &name, const std::filesystem::path &cache) {
   object.along_y = coarser(pulled(0.0, 1.0), Symmetry::even, Symmetry::odd);
   return object;
 }
-
-} // namespace
 
 const std::vector<std::string> &object_names() {
   static const std::vector<std::string> names{"sphere15", "sphere6", "cube12", "cube24", "cylinder24", "lime"};

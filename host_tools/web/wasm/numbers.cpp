@@ -9,11 +9,9 @@
 
 namespace fingertip {
 
-namespace {
-
 // strtod takes more than std::from_chars does: blanks, "+", hexadecimal, and what is too small to be anything but 0.
 template <typename Number>
-std::optional<Number> parsed(std::string_view text, Number (*convert)(const char *, char **)) {
+static std::optional<Number> parsed(std::string_view text, Number (*convert)(const char *, char **)) {
   if (text.empty() || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos || text[0] == '+') {
     return std::nullopt;
   }
@@ -25,14 +23,12 @@ std::optional<Number> parsed(std::string_view text, Number (*convert)(const char
   return end == copy.c_str() + copy.size() && std::isfinite(value) && !vanished ? std::optional(value) : std::nullopt;
 }
 
-template <typename Integer> std::optional<Integer> whole(std::string_view text) {
+template <typename Integer> static std::optional<Integer> whole(std::string_view text) {
   Integer value{};
   const char *end = text.data() + text.size();
   const auto result = std::from_chars(text.data(), end, value);
   return !text.empty() && result.ec == std::errc() && result.ptr == end ? std::optional(value) : std::nullopt;
 }
-
-} // namespace
 
 std::string shortest(float value) {
   char text[32];

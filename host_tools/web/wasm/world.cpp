@@ -10,7 +10,6 @@ extern "C" {
 #include <cmath>
 
 namespace fingertip::web {
-namespace {
 
 constexpr double AMBIENT_Pa = 101325.0;
 constexpr double PAD_mm = 12.0;
@@ -20,15 +19,13 @@ constexpr double SHEAR_N_mm2 = 1.0;
 constexpr int STEPS_WITHIN = 20; // Bundle's longest step while all slides
 constexpr double LEAST_N = twin::ForcePlanes::FORCE_MIN_N;
 
-bool all_finite(std::initializer_list<double> values) {
+static bool all_finite(std::initializer_list<double> values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
-bool on_pad(double x_mm, double y_mm) {
+static bool on_pad(double x_mm, double y_mm) {
   return std::abs(x_mm) <= World::HALF_WIDTH_mm && std::abs(y_mm) <= World::HALF_LENGTH_mm;
 }
-
-} // namespace
 
 World::World(std::vector<Object> objects, const twin::EffectValues &errors, std::uint64_t seed)
     : objects_(std::move(objects)), object_(objects_.data()),

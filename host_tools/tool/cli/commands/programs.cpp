@@ -7,12 +7,10 @@
 
 namespace fingertip {
 
-namespace {
-
 using Words = std::vector<std::string>;
 
 /* The tool links no simulation. */
-int simulate(Words options) {
+static int simulate(Words options) {
   const auto program = find_installed(
       {"../" FINGERTIP_LIBEXECDIR "/fingertip/fingertip-simulate", "../../simulation/cell/fingertip-simulate"});
   if (!program) {
@@ -23,7 +21,7 @@ int simulate(Words options) {
 }
 
 /* A command of the Python package, which asks this program for the gains and finds by it what else is installed. */
-int run_in_package(const std::string &name, Words options) {
+static int run_in_package(const std::string &name, Words options) {
   const auto package = find_installed({"../share/fingertip/python", "python"});
   if (!package) {
     throw Error("the Python package is not installed; install all of the tool, or build the target fingertip in the "
@@ -33,17 +31,15 @@ int run_in_package(const std::string &name, Words options) {
   options.insert(options.begin(), {package->string(), name});
   become("python3", options, name + " needs Python: sudo apt install python3 python3-numpy python3-serial");
 }
-int validate(Words options) { return run_in_package("validate", std::move(options)); }
-int fit(Words options) { return run_in_package("fit", std::move(options)); }
+static int validate(Words options) { return run_in_package("validate", std::move(options)); }
+static int fit(Words options) { return run_in_package("fit", std::move(options)); }
 
-void add_program(CommandLine &line, const std::string &name, const std::string &help, int (*run)(Words)) {
+static void add_program(CommandLine &line, const std::string &name, const std::string &help, int (*run)(Words)) {
   auto command = std::make_shared<CLI::App *>();
   *command = line.add(name, help, [command, run] { return run((*command)->remaining()); });
   (*command)->set_help_flag();
   (*command)->prefix_command();
 }
-
-} // namespace
 
 void add_simulate(CommandLine &line) {
   add_program(line, "simulate", "Simulate fingertips, which every program finds as it finds real ones, until Ctrl-C",
