@@ -154,7 +154,7 @@ void expect(FaultTrial &one) {
   }
   if (happening.kind == FaultKind::fault || happening.kind == FaultKind::power) {
     one.ends_in = {GRIP_FAULT};
-  } else if (happening.kind == FaultKind::taken && when.state == GRIP_RELEASE) {
+  } else if (happening.kind == FaultKind::taken && (when.state == GRIP_RELEASE || when.state == GRIP_HANDING)) {
     one.ends_in = {GRIP_RELEASE, GRIP_OPEN}; // as it was asked to
   } else if (happening.kind == FaultKind::taken) {
     one.ends_in = {untouched ? std::uint8_t{GRIP_MISSED} : std::uint8_t{GRIP_DROPPED}};
