@@ -1,6 +1,6 @@
-"""The images of the scenes raw, press, slip and shapes in the emulator, and the board's own, of scene grasp: a packet has no field of what
-is off, and no command brings it back. Scenes grasp and shapes report the tangential force in every frame, and shapes the contact shape too.
-Slip, grasp and shapes keep up with the fastest sensors.
+"""The images of the scenes raw, press, slip and shapes in the emulator, and the board's own, of scene grasp: nothing comes of what is off, and
+no command brings it back; lengths of packets are judged by unit.wire and unit.app_of_*. Scenes grasp and shapes report the tangential force
+in every frame, and shapes the contact shape too. Slip, grasp and shapes keep up with the fastest sensors.
 
 usage: test_scenes.py --scenes FOLDER --image FILE.bin --fingertip TOOL --command_frame PROGRAM --node NODE
 """
@@ -10,20 +10,15 @@ import tempfile
 import unittest
 
 from emulation import Run, main, make_scenario
-from fingertip import Flag, files, wire
+from fingertip import Flag, files
 
 TOOLS = argparse.Namespace()
 BOARD = "pico_parallel"
-# Of a packet, firmware/wire/PROTOCOL.md: types, and bytes of the body without what belongs to a capability.
-CONTACT, RAW, INFO, HEALTH, ACK = 0x01, 0x02, 0x03, 0x04, 0x05
-HEADER_AND_CRC_BYTES = 12 + 4
-INFO_BYTES, HEALTH_BYTES = 93 + 8 * 15, 72
-OF_FIT = {INFO: 13, HEALTH: 4}
 UNKNOWN_COMMAND, OUT_OF_RANGE = "1", "2"
 
 
 class SceneRun(Run):
-    """A second in contact. extra: (s, command...). acks: sequence number of the command -> result; body_bytes: packet type -> lengths of bodies."""
+    """A second in contact. extra: (s, command...). acks: sequence number of the command -> result."""
 
     def __init__(self, folder, scene, stream, extra=()):
         numbered = (("info",), ("stream", "contact,raw,health"), ("slip", "1", "100"), ("stream", f"{stream},health"))
@@ -32,11 +27,6 @@ class SceneRun(Run):
         image = TOOLS.image if scene == "grasp" else f"{TOOLS.scenes}/{scene}/{BOARD}/fingertip-{BOARD}.bin"
         super().__init__(TOOLS, folder, scene, BOARD, make_scenario(f"{folder}/wander.csv", "wander", 3), 1.8, commands, image=image)
         self.acks = {fields["command_sequence"]: fields["result"] for kind, fields in self.recording.packets if kind == "ack"}
-        self.body_bytes = {}
-        for frame in self.path("ftr").read_bytes().split(b"\0")[:-1]:  # the last one may be cut
-            packet = wire.cobs_decode(frame)
-            if packet:
-                self.body_bytes.setdefault(packet[1], set()).add(len(packet) - HEADER_AND_CRC_BYTES)
         self.has_contact = self.recording.has_contact
         self.has_raw = self.recording["valid"] == self.recording["valid"]
 
@@ -52,9 +42,6 @@ class Scenes(unittest.TestCase):
         self.assertTrue(self.raw.has_raw.all())
         self.assertFalse(self.raw.has_contact.any())
         self.assertGreater(len(self.raw.has_raw), 400 * 1.3)
-        self.assertEqual(set(self.raw.body_bytes), {RAW, INFO, HEALTH, ACK})
-        self.assertEqual(self.raw.body_bytes[INFO], {INFO_BYTES})
-        self.assertEqual(self.raw.body_bytes[HEALTH], {HEALTH_BYTES})
 
     def test_press_streams_contacts_and_nothing_of_slip_and_raw(self):
         self.assertEqual(self.press.recording.metadata["scene"], "press")
@@ -62,9 +49,6 @@ class Scenes(unittest.TestCase):
         self.assertFalse(self.press.has_raw.any())
         self.assertTrue(self.press.recording.flag(files.FIT_VALID)[-400:].all())
         self.assertFalse(self.press.recording.flag(files.SLIP | files.SLIP_VALID).any())
-        self.assertEqual(set(self.press.body_bytes), {CONTACT, INFO, HEALTH, ACK})
-        self.assertEqual(self.press.body_bytes[INFO], {INFO_BYTES + OF_FIT[INFO]})
-        self.assertEqual(self.press.body_bytes[HEALTH], {HEALTH_BYTES + OF_FIT[HEALTH]})
 
     def at_the_fastest(self, scene):
         """With a pad's profile, if it takes one: the recording, and which of its rows are of the last 0.9 s."""

@@ -8,22 +8,15 @@ export interface Vector {
   name: string;
   packet: Uint8Array;
   frame: Uint8Array;
-  /** name -> number, of the comments that name a field: "# bus_nacks 134744071". */
-  values: Map<string, number>;
 }
 
-export function readVectors(): Vector[] {
+function readVectors(): Vector[] {
   return readdirSync(folder)
     .sort()
     .map((name) => {
       const bytes: Record<string, number[]> = { packet: [], frame: [] };
       let to: number[] = [];
-      const values = new Map<string, number>();
       for (const line of readFileSync(join(folder, name), 'ascii').split('\n')) {
-        const said = /# (\w+) (-?[0-9.]+)(?: |$)/.exec(line);
-        if (said && bytes['frame']!.length === 0) {
-          values.set(said[1]!, Number(said[2]));
-        }
         for (const word of line.replace(/#.*/, '').trim().split(/\s+/).filter(Boolean)) {
           if (word in bytes) {
             to = bytes[word]!;
@@ -36,7 +29,6 @@ export function readVectors(): Vector[] {
         name: name.replace('.txt', ''),
         packet: Uint8Array.from(bytes['packet']!),
         frame: Uint8Array.from(bytes['frame']!),
-        values,
       };
     });
 }
