@@ -4,8 +4,6 @@
 #include "fit/fit_limits.h"
 #include "fit/fit_math.h"
 
-#include <string.h>
-
 uint64_t fit_packed_from(int32_t value, int32_t exponent) { return scaled_pack(scaled_from(value, exponent)); }
 
 uint64_t fit_packed_sqrt(struct scaled a) { return scaled_pack(scaled_sqrt(a)); }

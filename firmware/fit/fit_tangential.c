@@ -5,8 +5,6 @@
 #include "fit/fit_math.h"
 #include "fit/fit_tangential_parts.h"
 
-#include <string.h>
-
 /* 0.005 of the largest reading, and of a known dip half of what it may be off by in its middle. */
 #define MODEL_SD_Q16 328
 #define DIP_SD_Q16 (FIT_DIP_ERROR_Q16 / 2)

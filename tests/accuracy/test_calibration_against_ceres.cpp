@@ -1,7 +1,6 @@
 // The solver of placements against Ceres: the same cost, written once more with automatic
 // derivatives, must have no lower minimum, from another start, and there the same gains.
 #include "support/placements.hpp"
-#include "tool/calibration/solver.hpp"
 
 #include <ceres/ceres.h>
 #include <gtest/gtest.h>

@@ -4,7 +4,6 @@
 #include "flash_record.h"
 #include "fuzz.h"
 #include "native/native_cdc.h"
-#include "native/native_flash.h"
 #include "native/native_port.h"
 #include "native/native_sync.h"
 #include "native/sim_array.h"

@@ -6,7 +6,6 @@
 #include "packet_file.hpp"
 
 #include <cmath>
-#include <filesystem>
 
 using namespace fingertip;
 

@@ -1,8 +1,6 @@
 /* The store, on a flash that holds anything and loses its power at any step. */
 #include "flash_record.h"
 #include "fuzz.h"
-#include "native/native_flash.h"
-#include "store/store.h"
 
 enum { PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1 };
 

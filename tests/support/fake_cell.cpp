@@ -14,8 +14,6 @@
 #include "support/soft_fingertip.hpp"
 
 #include <map>
-#include <sstream>
-#include <unistd.h>
 
 using namespace fingertip;
 

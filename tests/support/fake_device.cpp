@@ -46,14 +46,11 @@
 #include <cmath>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <fcntl.h>
 #include <map>
 #include <memory>
 #include <optional>
 #include <termios.h>
-#include <unistd.h>
-#include <vector>
 
 namespace {
 

@@ -14,7 +14,6 @@
 #include <chrono>
 #include <functional>
 #include <optional>
-#include <string>
 
 namespace test {
 

@@ -14,13 +14,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cinttypes>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <list>
-#include <optional>
 #include <poll.h>
 #include <string>
 #include <sys/socket.h>

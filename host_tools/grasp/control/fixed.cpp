@@ -1,6 +1,5 @@
 #include "grasp/control/fixed.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 namespace fingertip {

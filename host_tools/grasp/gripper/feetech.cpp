@@ -4,7 +4,6 @@
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 #include <numeric>

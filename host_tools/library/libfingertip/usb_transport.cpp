@@ -10,7 +10,6 @@
 #include <cstdio>
 #include <deque>
 #include <libusb.h>
-#include <utility>
 #include <vector>
 
 namespace fingertip {

@@ -3,7 +3,6 @@
 #include "libfingertip/command.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <map>
 #include <utility>
 

@@ -11,7 +11,6 @@ extern "C" {
 #include "alternatives/alternatives.h"
 }
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 

@@ -2,7 +2,6 @@
 #include "report/fit/compared.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace fingertip::fitting {

@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <array>
 #include <ceres/ceres.h>
 #include <cmath>
 #include <limits>

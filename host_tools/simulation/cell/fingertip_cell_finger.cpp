@@ -15,7 +15,6 @@ extern "C" {
 #include "native/native_port.h"
 }
 
-#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>

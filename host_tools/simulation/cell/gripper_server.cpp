@@ -1,7 +1,6 @@
 #include "simulation/cell/gripper_server.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace fingertip {
 

@@ -8,7 +8,6 @@
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"
 
-#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>

@@ -4,8 +4,6 @@
 #include "simulation/twin/scenarios.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <fstream>
 #include <gtest/gtest.h>
 

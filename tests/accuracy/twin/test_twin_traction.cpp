@@ -3,8 +3,6 @@
 #include "simulation/twin/best_gaussian.hpp"
 #include "simulation/twin/traction_table.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <gtest/gtest.h>
 #include <map>
 #include <tuple>

@@ -2,8 +2,6 @@
  * AArch64"), for the kernels that the command line names by their numbers. */
 #include "fit_bits.h"
 
-#include <stdint.h>
-
 enum { SYS_WRITE0 = 0x04, SYS_GET_CMDLINE = 0x15, SYS_EXIT = 0x18 };
 #define APPLICATION_EXIT 0x20026u
 

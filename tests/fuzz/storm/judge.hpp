@@ -21,7 +21,6 @@
 #include "world.hpp"
 
 #include <cstddef>
-#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>

@@ -3,8 +3,6 @@
 extern "C" {
 #include "native/native_cdc.h"
 #include "native/native_flash.h"
-#include "native/native_port.h"
-#include "native/sim_array.h"
 }
 
 #include "native_firmware.h"

@@ -11,10 +11,6 @@
 #include "judge.hpp"
 #include "world.hpp"
 
-#include <cstdint>
-#include <string>
-#include <vector>
-
 namespace storm {
 
 struct Fault {

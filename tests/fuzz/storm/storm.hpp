@@ -7,10 +7,6 @@
 #include "native_plant.hpp"
 #include "world.hpp"
 
-#include <cstdint>
-#include <string>
-#include <vector>
-
 namespace storm {
 
 // From the end of a fault to the first of five good frames in a row. The firmware tries lost sensors

@@ -4,7 +4,6 @@
 #include "common/contact_flags.h"
 #include "support/random.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 
 #define FORCE_N 5.5

@@ -1,5 +1,4 @@
 /* The sync pin: its setting, its edges as packets, and its pulses. */
-#include "app/sync.h"
 #include "app_rig.h"
 
 void setUp(void) {

@@ -1,6 +1,5 @@
 /* The app of scene slip: commands and hosts that fail, health, crashes and what is reported of them. */
 #include "app_rig.h"
-#include "common/contact_flags.h"
 #include "config/build_info.h"
 #include "unit/wire/wire_samples.h"
 

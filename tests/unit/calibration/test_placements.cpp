@@ -1,7 +1,6 @@
 #include "support/placements.hpp"
 #include "tool/calibration/placements.hpp"
 
-#include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
 

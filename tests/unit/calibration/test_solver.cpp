@@ -1,6 +1,5 @@
 #include "support/placements.hpp"
 #include "tool/calibration/gain_session.hpp"
-#include "tool/calibration/solver.hpp"
 
 #include <algorithm>
 #include <gtest/gtest.h>

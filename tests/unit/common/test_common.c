@@ -5,9 +5,7 @@
 #include "support/random.h"
 #include "support/unit.h"
 
-#include <math.h>
 #include <stddef.h>
-#include <string.h>
 
 /* The definition: one bit at a time, no table. */
 static uint32_t crc32_bitwise(const uint8_t *bytes, size_t length) {

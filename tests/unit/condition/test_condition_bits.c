@@ -1,12 +1,9 @@
 /* Conditioning to the bit: frames by chance with presses, drifts, steps and sensors that fail. What changes a reading
  * was meant to, or is a mistake; where it was meant, the test says what to put here. */
-#include "common/crc32.h"
 #include "condition/condition.h"
 #include "support/draw.h"
 #include "support/golden.h"
 #include "support/unit.h"
-
-#include <string.h>
 
 enum { SENSORS = 15, COURSES = 64, FRAMES = 6000 };
 #define Pa 1024

@@ -1,7 +1,5 @@
 #include "condition_bench.h"
 
-#include <math.h>
-
 /* Ten minutes with drift: five seconds later the zero is right, and there was no phantom. */
 TEST(test_zero_recovers_after_a_long_contact) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {

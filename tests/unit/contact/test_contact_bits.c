@@ -2,15 +2,12 @@
  * creep, slide, are pulled and let go. What changes a result was meant to, or is a mistake; where
  * it was meant, the test says what to put here. */
 #include "common/contact_flags.h"
-#include "common/crc32.h"
 #include "contact/contact.h"
 #include "contact/motion.h"
 #include "contact/tangential.h"
 #include "support/draw.h"
 #include "support/golden.h"
 #include "support/unit.h"
-
-#include <string.h>
 
 enum { COURSES = 104, FRAMES = 1200 };
 #define ONE_IN(n) (draw_between(1, (n)) == 1)

@@ -3,7 +3,6 @@
 #include "support/random.h"
 #include "support/unit.h"
 
-#include <math.h>
 #include <string.h>
 
 #define SAYS (CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING | CONTACT_FLAG_SLIDING)

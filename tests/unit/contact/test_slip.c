@@ -2,8 +2,6 @@
 #include "support/random.h"
 #include "support/unit.h"
 
-#include <math.h>
-
 /* Positions are cut off towards zero at 1/16 um: two coordinates, two points. */
 #define ROUNDING_mm 1.9e-4f
 #define WINDOW_us 100000u

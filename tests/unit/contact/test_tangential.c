@@ -4,9 +4,6 @@
 #include "support/random.h"
 #include "support/unit.h"
 
-#include <math.h>
-#include <string.h>
-
 static struct tangential_settings settings;
 static struct tangential_history history;
 static struct fit_tangential found;

@@ -1,6 +1,5 @@
 #include "fit_bench.h"
 
-#include <math.h>
 #include <string.h>
 
 const float x_mm[SENSORS] = {-9, -9, -9, -9, -9, 0, 0, 0, 0, 0, 9, 9, 9, 9, 9};

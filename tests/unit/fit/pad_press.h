@@ -2,14 +2,10 @@
  */
 #pragma once
 
-#include "fit/fit.h"
 #include "support/grid.h"
 #include "support/pad.h"
 #include "support/random.h"
 #include "support/unit.h"
-
-#include <math.h>
-#include <string.h>
 
 struct contact {
   double x_mm, y_mm, force_N, qx_N, qy_N, spread_mm2;

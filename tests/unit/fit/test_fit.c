@@ -1,6 +1,5 @@
 #include "fit_bench.h"
 
-#include <math.h>
 #include <string.h>
 
 TEST(test_array_arguments) {

@@ -5,8 +5,6 @@
 #include "support/random.h"
 #include "support/unit.h"
 
-#include <math.h>
-
 #define SENSORS GRID_SENSORS
 #define ASSUMED 0.105f
 

@@ -7,7 +7,6 @@
 #include "support/random.h"
 #include "support/unit.h"
 
-#include <math.h>
 #include <stdbool.h>
 #include <string.h>
 

@@ -3,8 +3,6 @@
 #include "support/random.h"
 #include "support/unit.h"
 
-#include <math.h>
-
 TEST(test_mul_q30) {
   static const int32_t corners[] = {0,      1,       -1,         65535,      65536,       -65535,
                                     -65536, 1 << 30, -(1 << 30), 1073741823, -1073741823, 1073676289};

@@ -4,8 +4,6 @@
 #include "fit/fit_shapes_parts.h"
 #include "pad_press.h"
 
-#include <stdbool.h>
-
 #define SENSORS GRID_SENSORS
 #define ALL ((UINT32_C(1) << SENSORS) - 1)
 #define NOISE_Pa 4.0

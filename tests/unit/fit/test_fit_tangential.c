@@ -4,8 +4,6 @@
 #include "fit/fit_tangential.h"
 #include "pad_press.h"
 
-#include <stdbool.h>
-
 enum { SENSORS = GRID_SENSORS, ALL = (1 << SENSORS) - 1 };
 #define SEED UINT64_C(0x7461676E)
 #define TURN 6.283185307179586

@@ -1,6 +1,5 @@
 #include "fit_bench.h"
 
-#include <math.h>
 #include <string.h>
 
 TEST(test_equal_readings_are_flat) {

@@ -1,7 +1,6 @@
 #include "grasp/fingertip.hpp"
 #include "support/host_packets.hpp"
 
-#include <cmath>
 #include <gtest/gtest.h>
 #include <limits>
 

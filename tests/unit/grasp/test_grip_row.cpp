@@ -6,7 +6,6 @@
 #include "support/host_packets.hpp"
 
 #include <algorithm>
-#include <fstream>
 #include <gtest/gtest.h>
 
 using namespace fingertip;

@@ -1,5 +1,4 @@
 #include "grasp/gripper_thread.hpp"
-#include "libfingertip/clock.hpp"
 #include "support/fake_gripper.hpp"
 
 #include <functional>

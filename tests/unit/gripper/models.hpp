@@ -1,8 +1,6 @@
 /* What the tests of all models share. */
 #pragma once
 
-#include "grasp/gripper/gripper.hpp"
-#include "libfingertip/error.hpp"
 #include "support/gripper_lines.hpp"
 
 #include <gtest/gtest.h>

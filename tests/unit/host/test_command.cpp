@@ -5,7 +5,6 @@
 #include "support/host_packets.hpp"
 #include "support/pad.h"
 
-#include <cmath>
 #include <gtest/gtest.h>
 #include <map>
 

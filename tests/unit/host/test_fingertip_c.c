@@ -3,10 +3,7 @@
 #include "support/unit.h"
 #include "unit/wire/wire_samples.h"
 
-#include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
-#include <string.h>
 
 #define OK(call) TEST_ASSERT_EQUAL_INT(FINGERTIP_OK, call)
 

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <functional>
 #include <gtest/gtest.h>
-#include <sstream>
 
 using namespace fingertip;
 

@@ -2,7 +2,6 @@
 
 #include "rp2040/event.h"
 #include "rp2040/gpio.h"
-#include "rp2040/i2c.h"
 
 #include <string.h>
 

@@ -3,7 +3,6 @@
 #include "library/pad/profile.hpp"
 #include "support/host_packets.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>

@@ -1,7 +1,6 @@
 #include "library/pad/profile.hpp"
 #include "report/measure/sessions.hpp"
 
-#include <cmath>
 #include <gtest/gtest.h>
 
 using namespace fingertip;

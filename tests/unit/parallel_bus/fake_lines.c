@@ -1,7 +1,5 @@
 #include "fake_lines.h"
 
-#include "rp2040/wave_player.h"
-
 #include <string.h>
 
 struct fake_lines fake;

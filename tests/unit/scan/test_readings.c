@@ -2,7 +2,6 @@
 #include "support/random.h"
 #include "support/unit.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 enum { SENSORS = 15, ONE = 7 };

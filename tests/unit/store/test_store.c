@@ -7,8 +7,6 @@
 #include "support/random.h"
 #include "support/unit.h"
 
-#include <string.h>
-
 /* PROFILE_BYTES: without the struct's padding. */
 enum { SENSORS = 15, UPDATES = 2000, PROFILE_BYTES = 4 * PAD_PROFILE_FLOATS + 1 };
 

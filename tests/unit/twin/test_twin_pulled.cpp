@@ -1,8 +1,5 @@
 #include "scenes.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <gtest/gtest.h>
 #include <set>
 

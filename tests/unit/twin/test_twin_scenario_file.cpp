@@ -4,13 +4,8 @@
 #include "scenes.hpp"
 #include "simulation/twin/scenario_file.hpp"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <gtest/gtest.h>
-#include <map>
 #include <sstream>
 
 using namespace fingertip;

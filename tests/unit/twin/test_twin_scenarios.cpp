@@ -1,9 +1,6 @@
 #include "scenes.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <gtest/gtest.h>
-#include <map>
 #include <set>
 
 using namespace fingertip;

@@ -1,8 +1,6 @@
 #include "support/unit.h"
 #include "wire_samples.h"
 
-#include <stdbool.h>
-
 /* Body length by PROTOCOL.md. */
 static size_t body_length(const struct wire_packet *packet) {
   static const struct {

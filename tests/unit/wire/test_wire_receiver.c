@@ -1,8 +1,6 @@
 #include "support/unit.h"
 #include "wire_samples.h"
 
-#include <stdbool.h>
-
 struct frame_bytes {
   uint8_t bytes[WIRE_MAX_FRAME_BYTES];
   size_t length;

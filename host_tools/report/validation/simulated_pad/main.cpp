@@ -20,7 +20,6 @@ extern "C" {
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 namespace fingertip::cell {
