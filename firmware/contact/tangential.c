@@ -55,17 +55,7 @@ void tangential_estimate(void *job) {
 void tangential_reset(struct tangential_history *history) { memset(history, 0, sizeof *history); }
 
 /* As struct pad_edges has them. */
-enum edge {
-  RATIO_X,
-  RATIO_Y,
-  GAIN_X,
-  GAIN_Y,
-  PLACE_X_mm,
-  PLACE_Y_mm,
-  PULL_X_mm,
-  PULL_Y_mm,
-  FORCE,
-};
+enum edge { RATIO_X, RATIO_Y, GAIN_X, GAIN_Y, PLACE_X_mm, PLACE_Y_mm, PULL_X_mm, PULL_Y_mm, FORCE };
 _Static_assert(FORCE + 1 == PAD_EDGE_KINDS, "all of them");
 
 /* In soft float what follows takes a tenth of a frame at OSR 256. */

@@ -9,12 +9,8 @@
 
 namespace fingertip {
 
-namespace {
-
 // At this frame rate an object at 0.1 m/s slides by a millimetre between two frames.
 constexpr std::uint32_t RATE_mHz = 100000;
-
-} // namespace
 
 GripTouch touch_from_packet(const wire_packet &packet, double host_us) {
   const wire_contact &contact = packet.body.contact;

@@ -11,9 +11,7 @@
 using namespace fingertip;
 using namespace fingertip::values;
 
-namespace {
-
-GripperTraits traits_of(const fingertip_grip_traits &given) {
+static GripperTraits traits_of(const fingertip_grip_traits &given) {
   const double all[] = {given.stroke_mm,      given.step_mm,     given.speed_min_mm_s,
                         given.speed_max_mm_s, given.deadband_mm, given.force_min_N,
                         given.force_max_N,    given.latency_s,   given.poll_s};
@@ -29,7 +27,8 @@ GripperTraits traits_of(const fingertip_grip_traits &given) {
           given.poll_s};
 }
 
-GripSettings settings_of(const GripperTraits &traits, const char *const *names, const double *values, size_t count) {
+static GripSettings settings_of(const GripperTraits &traits, const char *const *names, const double *values,
+                                size_t count) {
   std::map<std::string, double> wanted;
   for (std::size_t i = 0; i < count && names && values; i++) {
     const GraspSetting &setting = setting_of_field(names[i]);
@@ -49,9 +48,7 @@ GripSettings settings_of(const GripperTraits &traits, const char *const *names, 
   }
 }
 
-fingertip_status null() { return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL"); }
-
-} // namespace
+static fingertip_status null() { return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL"); }
 
 struct fingertip_grip {
   GripperTraits traits;

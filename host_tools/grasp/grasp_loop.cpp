@@ -10,8 +10,6 @@
 
 namespace fingertip {
 
-namespace {
-
 using std::chrono::milliseconds;
 using Kind = GraspNews::Kind;
 
@@ -20,8 +18,6 @@ constexpr milliseconds STEP{5};
 constexpr std::int64_t LAST_WORD_us = 500000;
 // News that wait: ten seconds of two fingertips at 1308 frames a second, and the steps.
 constexpr std::size_t MOST_NEWS = 80000;
-
-} // namespace
 
 GraspLoop::GraspLoop(const std::array<Way, FINGERS> &ways, Options options) : options_(std::move(options)) {
   DeviceLoop::Options wanted;

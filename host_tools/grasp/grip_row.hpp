@@ -1,6 +1,5 @@
-// The gripper's and the controller's rows in a recording of a grasp. Such a recording is a joint
-// recording of its two fingertips (libfingertip/RECORDING.md), 0 the left and 1 the right, with
-// these lines between:
+// The gripper's and the controller's rows in a recording of a grasp. Such a recording is a joint recording of its two
+// fingertips (libfingertip/RECORDING.md), 0 the left and 1 the right, with these lines between:
 //
 //   # grip: time_us,state,trouble,width_mm,...    once, before the first
 //   # grip: 1530022.0,holding,,34.217,...         the time is the rows', by the recorder's clock

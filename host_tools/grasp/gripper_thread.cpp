@@ -8,8 +8,6 @@
 
 namespace fingertip {
 
-namespace {
-
 // No gripper answers sooner; and a line that fails at once is not asked without pause.
 constexpr std::int64_t SHORTEST_us = 1000;
 // A port that is gone is tried so often.
@@ -17,19 +15,17 @@ constexpr std::int64_t REOPEN_us = 200000;
 // Answers that are not taken: some seconds of them.
 constexpr std::size_t MOST_NEWS = 2000;
 
-bool is_same(const GripCommand &a, const GripCommand &b) {
+static bool is_same(const GripCommand &a, const GripCommand &b) {
   return a.motion == b.motion && (a.motion != GRIP_MOVE ||
                                   (a.width_mm == b.width_mm && a.speed_mm_s == b.speed_mm_s && a.force_N == b.force_N));
 }
 
-std::string trouble_of(const Gripper &gripper, const GripperStatus &status) {
+static std::string trouble_of(const Gripper &gripper, const GripperStatus &status) {
   if (status.fault != 0) {
     return "fault " + std::to_string(status.fault) + ", " + gripper.fault_text(status.fault);
   }
   return status.was_left_alone ? "no command for a second" : "";
 }
-
-} // namespace
 
 GripperThread::GripperThread(std::unique_ptr<Gripper> gripper, OpenGripper reopen)
     : gripper_(std::move(gripper)), reopen_(std::move(reopen)),

@@ -22,9 +22,8 @@ constexpr double STEADY = 0.15, STEADY_s = 0.1, STEADY_N = 0.15;
 constexpr double LOADED_s = 0.3; // a load is known once it was steady for this time
 // A reported slide below this speed is a contact that settles, unless it lasts longer than CREEPS_s.
 constexpr double CREEPS_mm_s = 4.0, CREEPS_s = 0.15;
-// A contact that held within LATELY_s does not slide below this share of the ratio that it held,
-// unless it became slick. Then it slides by FAR_mm and more; squeezed rubber, and an object that was
-// just caught, move less.
+// A contact that held within LATELY_s does not slide below this share of the ratio that it held, unless it became
+// slick. Then it slides by FAR_mm and more; squeezed rubber, and an object that was just caught, move less.
 constexpr double LATELY_s = 0.2, BEGINS_AT = 0.7, FAR_mm = 1.0;
 // Friction that falls as a slide begins is followed with this time constant.
 constexpr double FALLS_s = 0.06;

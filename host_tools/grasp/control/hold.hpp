@@ -24,12 +24,10 @@ private:
   double now_ = MOST;
 };
 
-// The load that the grip carries. A sliding contact does not show it: its tangential force is its
-// friction.
+// The load that the grip carries. A sliding contact does not show it: its tangential force is its friction.
 class GripLoad {
 public:
-  // Updates from a contact that rests. sd_N: less is no rise. swings: it was
-  // caught, and swings on the rubber.
+  // Updates from a contact that rests. sd_N: less is no rise. swings: it was caught, and swings on the rubber.
   void rests(double load_N, double sd_N, double passed_s, bool swings);
   // Updates from a contact that slides and does not slow down: its load is at least its friction, and
   // stopping it takes more.

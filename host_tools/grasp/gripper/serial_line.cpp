@@ -15,22 +15,18 @@ namespace fingertip {
 
 namespace fs = std::filesystem;
 
-namespace {
-
-speed_t speed_of(unsigned baud) {
+static speed_t speed_of(unsigned baud) {
   static constexpr std::pair<unsigned, speed_t> SPEEDS[] = {{115200, B115200}, {1000000, B1000000}};
   const auto *found = find_in(SPEEDS, [&](const auto &one) { return one.first == baud; });
   return found ? found->second : throw std::logic_error("no such speed");
 }
 
-std::string line_of(const fs::path &path) {
+static std::string line_of(const fs::path &path) {
   std::ifstream file(path);
   std::string text;
   std::getline(file, text);
   return std::string(trim(text));
 }
-
-} // namespace
 
 SerialLine::SerialLine(const std::string &path, unsigned baud) : path_(path), transport_(path) {
   const int fd = descriptor();

@@ -11,8 +11,6 @@
 
 namespace fingertip {
 
-namespace {
-
 using std::chrono::milliseconds;
 using Kind = DeviceNews::Kind;
 
@@ -29,8 +27,6 @@ constexpr std::int64_t LONGEST_BACKLOG_us = 2000000;
 /* Of each fingertip: three seconds of 1308 frames of two packets, so that a disk may stall for two. */
 constexpr std::size_t FEED_CAPACITY = 8000;
 constexpr Session::Policy LAST_WORD = {milliseconds(500), 2};
-
-} // namespace
 
 std::vector<DeviceNews> DeviceFeed::take(milliseconds timeout) {
   std::unique_lock<std::mutex> lock(mutex_);

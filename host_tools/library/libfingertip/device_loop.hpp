@@ -1,7 +1,6 @@
-/* A fingertip from its first answer to the end of its streams. The loop greets it, streams, waits
- * for it when its port vanishes, and greets it again. Each has a thread of its own, so that none
- * waits for another and arrivals are timed as they happen. The news of all of them come out of one
- * feed. One fingertip and many work alike.
+/* A fingertip from its first answer to the end of its streams. The loop greets it, streams, waits for it when its port
+ * vanishes, and greets it again. Each has a thread of its own, so that none waits for another and arrivals are timed as
+ * they happen. The news of all of them come out of one feed. One fingertip and many work alike.
  *
  *   DeviceFeed feed;
  *   DeviceLoop loop(0, way, options, feed);

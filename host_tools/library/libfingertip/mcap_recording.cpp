@@ -14,8 +14,6 @@ namespace fingertip {
 
 using namespace recording;
 
-namespace {
-
 constexpr const char *CONTACT = "fingertip_msgs/Contact";
 constexpr const char *LINE = "fingertip_msgs/Line";
 constexpr const char *PERIODIC_LINES = "/fingertip/lines/periodic"; /* those that each second has */
@@ -24,13 +22,13 @@ constexpr std::size_t WAITING_MOST = 1 << 16; /* lines for one before them, befo
 constexpr std::uint64_t MESSAGE_MOST_bytes = 1 << 20; /* packed by itself */
 
 /* The name in schemas: "fingertip_msgs/msg/Line". */
-std::string full_name(const std::string &name) {
+static std::string full_name(const std::string &name) {
   std::size_t slash = name.find('/');
   return name.substr(0, slash) + "/msg" + name.substr(slash);
 }
 
 /* Parses a time of a recording to ns since 1970. */
-std::optional<std::uint64_t> utc_ns(const std::string &text) {
+static std::optional<std::uint64_t> utc_ns(const std::string &text) {
   std::tm parts{};
   const char *rest = strptime(text.c_str(), "%Y-%m-%dT%H:%M:%S", &parts);
   if (!rest) {
@@ -54,7 +52,7 @@ std::optional<std::uint64_t> utc_ns(const std::string &text) {
 }
 
 /* Later, or earlier, in the range of a message's time. */
-std::uint64_t shifted_ns(std::uint64_t ns, double by_us) {
+static std::uint64_t shifted_ns(std::uint64_t ns, double by_us) {
   double by_ns = std::round(by_us * 1000);
   double most = static_cast<double>(ros::LATEST_ns);
   if (by_ns < 0) {
@@ -64,7 +62,7 @@ std::uint64_t shifted_ns(std::uint64_t ns, double by_us) {
   return std::min(ros::LATEST_ns, ns + static_cast<std::uint64_t>(std::min(by_ns, most)));
 }
 
-bool is_list(const std::string &key) {
+static bool is_list(const std::string &key) {
   bool of_sensors = false;
   auto visit = [&](const char *name, auto) { of_sensors = of_sensors || key == name; };
   visit_sensor_lists(visit);
@@ -72,15 +70,15 @@ bool is_list(const std::string &key) {
          std::any_of(std::begin(pad_lists), std::end(pad_lists), [&](const auto &each) { return key == each.name; });
 }
 
-bool begins_with(const std::string &text, const char *begin) { return text.rfind(begin, 0) == 0; }
+static bool begins_with(const std::string &text, const char *begin) { return text.rfind(begin, 0) == 0; }
 
-bool is_of_calibration(const std::string &key) {
+static bool is_of_calibration(const std::string &key) {
   return begins_with(key, "calibration_") || begins_with(key, "force_scale") || begins_with(key, "pad_") ||
          is_list(key);
 }
 
 /* "# key: value" taken apart; nothing of other lines. */
-std::optional<std::pair<std::string, std::string>> key_and_value(const std::string &text) {
+static std::optional<std::pair<std::string, std::string>> key_and_value(const std::string &text) {
   std::size_t colon = text.find(": ");
   if (text.empty() || text[0] != '#' || colon == std::string::npos) {
     return std::nullopt;
@@ -90,13 +88,13 @@ std::optional<std::pair<std::string, std::string>> key_and_value(const std::stri
 }
 
 /* Of a line that each second or more has. */
-bool is_periodic(const std::string &text) {
+static bool is_periodic(const std::string &text) {
   const auto pair = key_and_value(text);
   const std::string key = pair ? pair->first.substr(pair->first.find('/') + 1) : "";
   return key == "clock" || key == "grip" || (key == "packet" && begins_with(pair->second, PACKET_HEALTH));
 }
 
-void set(mcap::Pairs &pairs, const std::string &key, const std::string &value) {
+static void set(mcap::Pairs &pairs, const std::string &key, const std::string &value) {
   if (auto *found = find_in(pairs, [&](const auto &pair) { return pair.first == key; })) {
     found->second = value;
   } else {
@@ -104,7 +102,7 @@ void set(mcap::Pairs &pairs, const std::string &key, const std::string &value) {
   }
 }
 
-std::string json(const std::string &serial, const mcap::Pairs &pairs) {
+static std::string json(const std::string &serial, const mcap::Pairs &pairs) {
   std::string text = "{\"serial\": \"" + serial + "\"";
   for (const auto &[key, value] : pairs) {
     const std::string numbers = joined(split(value, ' '), ", ");
@@ -114,7 +112,7 @@ std::string json(const std::string &serial, const mcap::Pairs &pairs) {
 }
 
 /* UTF-8 without zeros; tabs and the end of a DOS line are none of the printable characters. */
-bool is_text(const std::string &text) {
+static bool is_text(const std::string &text) {
   std::string plain = text;
   std::replace_if(
       plain.begin(), plain.end(), [](char c) { return c == '\t' || c == '\r'; }, ' ');
@@ -122,21 +120,19 @@ bool is_text(const std::string &text) {
 }
 
 /* In "/fingertip/SERIAL/contact". */
-std::string serial_in(const std::string &topic) {
+static std::string serial_in(const std::string &topic) {
   const auto words = split(topic, '/');
   std::string name(words[words.size() >= 2 ? words.size() - 2 : 0]);
   return name.substr(name.size() > 1 && name[0] == 's' && std::isdigit(static_cast<unsigned char>(name[1])) ? 1 : 0);
 }
 
-mcap::Reader::Message line_message(const ros::Line &line) {
+static mcap::Reader::Message line_message(const ros::Line &line) {
   return {"/fingertip/lines", full_name(LINE), ros::encode({0, ""}, line), 0};
 }
 
-std::string joint_cells(std::uint32_t device, double time_us) {
+static std::string joint_cells(std::uint32_t device, double time_us) {
   return std::to_string(device) + "," + fixed(time_us, 1) + ",";
 }
-
-} // namespace
 
 LogClock::LogClock(const std::string &started_utc, const std::string &started_device_us)
     : begin_ns_(utc_ns(started_utc).value_or(0)), now_ns_(begin_ns_) {

@@ -15,8 +15,6 @@
 
 namespace fingertip {
 
-namespace {
-
 namespace fs = std::filesystem;
 
 constexpr const char *SOCKET_END = ".sock";
@@ -24,21 +22,19 @@ constexpr const char *PORT_END = ".port";
 constexpr const char *SIMULATED = "sim:";
 
 /* Where everybody may make folders. */
-std::string own_folder_in_tmp() { return "/tmp/fingertip-" + std::to_string(geteuid()); }
+static std::string own_folder_in_tmp() { return "/tmp/fingertip-" + std::to_string(geteuid()); }
 
-bool is_of_this_user(const std::string &folder) {
+static bool is_of_this_user(const std::string &folder) {
   struct stat status;
   return lstat(folder.c_str(), &status) == 0 && S_ISDIR(status.st_mode) && status.st_uid == geteuid();
 }
 
 /* What is in no name of a file becomes '_'. */
-std::string as_name(std::string serial) {
+static std::string as_name(std::string serial) {
   std::replace_if(
       serial.begin(), serial.end(), [](unsigned char c) { return !std::isalnum(c) && c != '-' && c != '_'; }, '_');
   return serial;
 }
-
-} // namespace
 
 std::string own_share_folder() {
   const char *runtime = std::getenv("XDG_RUNTIME_DIR");

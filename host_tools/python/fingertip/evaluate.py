@@ -2,9 +2,8 @@
 
     fingertip-evaluate RECORDING.csv SCENARIO.csv [--run run.json] -o summary.json
 
-Scenario time = device time + device_time_zero_s of the run report (0 without one). The truth is taken at each
-frame's own time, linear between the scenario's rows. Frames whose time falls between a row with and a row
-without contact belong to neither.
+Scenario time = device time + device_time_zero_s of the run report (0 without one). The truth is taken at each frame's own time, linear
+between the scenario's rows. Frames whose time falls between a row with and a row without contact belong to neither.
 
     frames, frames_per_s       contact packets in the recording, and their rate in device time
     fitted_frames              frames with truth in contact and FIT_VALID: the ones compared

@@ -3,8 +3,7 @@
 // cell, the gripper and the controller go on by slices of emulated time, after each of which the boards' bytes are
 // handed over.
 //
-// The controller takes what came in a slice at its end, so up to a slice late; all else is at its
-// own time.
+// The controller takes what came in a slice at its end, so up to a slice late; all else is at its own time.
 #include "grasp/fingertip.hpp"
 #include "grasp/gripper/gripper.hpp"
 #include "libfingertip/clock_fit.hpp"
@@ -62,8 +61,7 @@ struct Options {
 // A fingertip that is an emulated board, from the host's end of its USB line: it gets its pad's
 // profile and its calibration first, then it streams its readings.
 //
-// Its clock is fitted from commands and their acknowledgements, as the tool does it, on the
-// emulated time.
+// Its clock is fitted from commands and their acknowledgements, as the tool does it, on the emulated time.
 class EmulatedFingertip {
 public:
   // random: of its sensors' gains and its calibration.

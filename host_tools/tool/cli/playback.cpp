@@ -9,8 +9,6 @@
 
 namespace fingertip {
 
-namespace {
-
 /* Takes some 6 ms: 2.7 us each, as measured by a replay of 31 424 frames at --speed max. */
 constexpr int PACKETS_AT_ONCE = 2000;
 constexpr double SHORT_WAY_us = 5e6, LONG_WAY_us = 60e6;
@@ -20,24 +18,22 @@ constexpr double MARKS_us = 10e6;
 constexpr double PAUSE_MOST_us = 10e6;
 constexpr double END = std::numeric_limits<double>::infinity();
 
-std::optional<double> time_of(const PacketFile::Item &item, FrameClock &clock) {
+static std::optional<double> time_of(const PacketFile::Item &item, FrameClock &clock) {
   if (item.kind != PacketFile::Item::Kind::packet || !is_frame(item.packet)) {
     return std::nullopt;
   }
   return item.time_us ? item.time_us : clock.take(item.packet.t_us);
 }
 
-std::optional<double> time_of(const GripRow &row, FrameClock &) { return row.time_us; }
+static std::optional<double> time_of(const GripRow &row, FrameClock &) { return row.time_us; }
 
-void take(Model &model, const PacketFile::Item &item) {
+static void take(Model &model, const PacketFile::Item &item) {
   if (item.kind == PacketFile::Item::Kind::packet) {
     model.take(item.packet);
   }
 }
 
-void take(GripModel &model, const GripRow &row) { model.take(row); }
-
-} // namespace
+static void take(GripModel &model, const GripRow &row) { model.take(row); }
 
 double FrameClock::take(std::uint64_t t_us) {
   if (!begun || t_us < last_us) {

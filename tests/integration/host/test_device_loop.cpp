@@ -7,8 +7,6 @@ using namespace fingertip;
 using std::chrono::milliseconds;
 using Kind = DeviceNews::Kind;
 
-namespace {
-
 /* Its port is a link in a folder of its own. */
 struct Streamer {
   explicit Streamer(int rate_Hz = 10000) : fingertip(folder / "tty", "A", rate_Hz, [] { return test::Feel{}; }) {}
@@ -17,13 +15,11 @@ struct Streamer {
   test::SoftFingertip fingertip;
 };
 
-DeviceLoop::Options streaming() {
+static DeviceLoop::Options streaming() {
   DeviceLoop::Options options;
   options.streams = WIRE_STREAM_CONTACT;
   return options;
 }
-
-} // namespace
 
 TEST(DeviceLoop, AFullFeedHoldsItBackAndDoesNotKeepItFromEnding) {
   Streamer streamer;

@@ -98,8 +98,7 @@ TEST(Grip, NeverTightensASaturatedFingertipNorWithoutFrames) {
   }
 }
 
-// A slide does not hurry a gripper that cannot keep the cap itself: each move shows before the
-// next.
+// A slide does not hurry a gripper that cannot keep the cap itself: each move shows before the next.
 TEST(Grip, ASlideNeverLeadsBeyondALowCap) {
   for (const double stiffness : {2.0, 2.5}) {
     GripWorld world({{"cap", 4.0}, {"start", 0.6}, {"floor", 0.5}}, gripper_traits("2f85"));

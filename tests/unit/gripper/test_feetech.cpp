@@ -104,13 +104,11 @@ TEST(Feetech, FaultsAreBits) {
   EXPECT_EQ(gripper->fault_text(0x80), "a fault that its memory table does not have");
 }
 
-namespace {
-
 /* Exchanges of a tape. */
 using feetech::Bytes;
 using feetech::Packet;
 
-std::string text(const Packet &packet) {
+static std::string text(const Packet &packet) {
   std::string digits;
   for (std::uint8_t byte : feetech::encoded(packet)) {
     char two[4];
@@ -123,21 +121,19 @@ std::string text(const Packet &packet) {
 const Packet ASK_TABLE = {6, feetech::READ, {feetech::MODEL, 31}};
 const Packet ASK_STATUS = {6, feetech::READ, {feetech::TORQUE_ENABLE, 31}};
 
-Packet table() {
+static Packet table() {
   Bytes bytes(31);
   bytes[0] = feetech::STS3215 & 0xFF;
   bytes[1] = feetech::STS3215 >> 8;
   return {6, 0, bytes};
 }
 
-Packet status(int position) {
+static Packet status(int position) {
   Bytes bytes(31);
   bytes[feetech::PRESENT_POSITION - feetech::TORQUE_ENABLE] = static_cast<std::uint8_t>(position & 0xFF);
   bytes[feetech::PRESENT_POSITION - feetech::TORQUE_ENABLE + 1] = static_cast<std::uint8_t>(position >> 8);
   return {6, 0, bytes};
 }
-
-} // namespace
 
 TEST(FeetechFrames, APositionOutsideOfATurnIsRefused) {
   for (const int position : {6396, 0x8005}) {

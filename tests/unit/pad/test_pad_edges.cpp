@@ -13,13 +13,11 @@ extern "C" {
 
 using namespace fingertip;
 
-namespace {
-
 constexpr double OVERHANG_mm = 9.0;
 
-pad_profile profile() { return pad::profile_over_own_sensors({12.0, OVERHANG_mm, false}); }
+static pad_profile profile() { return pad::profile_over_own_sensors({12.0, OVERHANG_mm, false}); }
 
-twin::BlockTable block(const wire_info &info) {
+static twin::BlockTable block(const wire_info &info) {
   std::vector<twin::Place> sensors;
   for (int k = 0; k < info.sensor_count; k++) {
     sensors.push_back({double(info.x_mm[k]), double(info.y_mm[k])});
@@ -35,8 +33,8 @@ struct Told {
 
 /* What the firmware says of a contact 3 mm wide on the pad that ends. The layer's part is written
  * again here, from the formulas of pad_profile.h. */
-Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, double y_mm, double qx, double qy,
-          float dip_share) {
+static Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, double y_mm, double qx, double qy,
+                 float dip_share) {
   const wire_info info = pad::own_sensors();
   constexpr double FORCE_N = 4.0, SPREAD_mm2 = 3.0;
   std::array<std::int32_t, FT_MAX_SENSORS> readings{};
@@ -92,7 +90,7 @@ Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, dou
 
 /* The mean error of Q / F with the edges' coefficients; it was as large without. dip_share: what a calibration has made
  * of the ends. */
-void take_back(const wire_info &info, float dip_share, double was) {
+static void take_back(const wire_info &info, float dip_share, double was) {
   const pad_profile endless = profile();
   pad_profile mended = endless;
   mended.edges = pad::edges_of(endless, info, FINGERTIP_TABLES_DIR);
@@ -123,8 +121,6 @@ void take_back(const wire_info &info, float dip_share, double was) {
   EXPECT_GT(without / count, was);
   EXPECT_LT(with / count, 0.03);
 }
-
-} // namespace
 
 TEST(PadEdges, TakeBackWhatTheEndsDo) { take_back(pad::own_sensors(), 0.0F, 0.10); }
 

@@ -1,6 +1,5 @@
-/* fingertip calibrate: gains of the sensors, and the scale of the force, from placements of one
- * weight, or the scale of the tangential force from pulls of one, live or in a recording, and into
- * the fingertip. */
+/* fingertip calibrate: gains of the sensors, and the scale of the force, from placements of one weight, or the scale of
+ * the tangential force from pulls of one, live or in a recording, and into the fingertip. */
 #include "libfingertip/clock.hpp"
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
