@@ -17,7 +17,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(ROOT / "host_tools/python"), str(ROOT / "host_tools/demo")]
 import fuzz  # noqa: E402
-from fingertip import files  # noqa: E402
+from fingertip import files, grip_file  # noqa: E402
 from grasp import read_truth  # noqa: E402
 
 TRUTH = "# fingertip-truth 1\nt_s,slips,slid_mm,force_N\n0.000,0,0.0,0.1\n0.002,1,0.5,2.5\n"
@@ -36,7 +36,7 @@ def check_recording(path, prng):
 
 
 def check_grip(path, prng):
-    files.read_grip(path, salvage=prng.random() < 0.5)
+    grip_file.read_grip(path, salvage=prng.random() < 0.5)
 
 
 def check_scenario(path, _):

@@ -33,7 +33,6 @@ import numpy.typing as npt
 from . import line, recorded
 from .errors import InputError
 from .frames import Edge, frame_of
-from .grip_table import State
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
 from .mcap_recording import MAGIC, Contacts, Damaged, Line, LogClock, McapLineReader, Skipped
 from .recorded import Array, Rows, counts_of, judge_key, packet_of
@@ -127,7 +126,7 @@ def write_bytes(path: Path, content: bytes) -> None:
         raise InputError(f"{path}: {error.strerror}; choose another place") from None
 
 
-def _number(path: Path, line: int, column: str, cell: str, empty_allowed: bool) -> float:
+def number_of(path: Path, line: int, column: str, cell: str, empty_allowed: bool) -> float:
     if cell == "" and empty_allowed:
         return math.nan
     try:
@@ -214,7 +213,7 @@ def read_scenario(path: Path) -> Scenario:
             continue
         if len(cells) != len(header):
             raise InputError(f"{path}:{number}: {len(cells)} columns where the header has {len(header)}; write the scenario again")
-        row = [_number(path, number, name, cell, False) for name, cell in zip(header, cells)]
+        row = [number_of(path, number, name, cell, False) for name, cell in zip(header, cells)]
         if row[0] < 0:
             raise InputError(f"{path}:{number}: t_s is {cells[0]}; time starts at 0")
         if rows and row[0] <= rows[-1][0]:
@@ -646,11 +645,6 @@ def read_recording(
     return Recording(reading, [reading.rows.names[i] for i in reading.wanted], skipped)
 
 
-GRIP_WORDS = ("state", "trouble")  # its columns that are names
-GRIP_STATES = [state.name.lower() for state in State]
-GRIP_ROW = "# grip: "
-
-
 def restart_rows(t: npt.NDArray[Any], frame: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
     """The rows, but the first, that a run of a fingertip begins with: the time or the frame's number steps back. Numbers
     wrap (PROTOCOL.md)."""
@@ -658,47 +652,12 @@ def restart_rows(t: npt.NDArray[Any], frame: npt.NDArray[Any]) -> npt.NDArray[np
     return np.flatnonzero((np.diff(t) < 0) | (steps >= 2**31)) + 1
 
 
-def _grip_values(path: Path, number: int, columns: list[str], cells: list[str]) -> list[Any]:
-    if len(cells) != len(columns):
-        raise InputError(
-            f"{path}:{number}: {len(cells)} columns of the gripper where its header has {len(columns)}; use --salvage to skip the line"
-        )
-    if cells[columns.index("state")] not in GRIP_STATES:
-        raise InputError(f'{path}:{number}: state is "{cells[columns.index("state")]}"; use --salvage to skip the line')
-    return [cell if name in GRIP_WORDS else _number(path, number, name, cell, name != "time_us") for name, cell in zip(columns, cells)]
-
-
-def _undamaged(path: Path, salvage: bool) -> Iterator[Line]:
+def undamaged(path: Path, salvage: bool) -> Iterator[Line]:
     for each in _RecordingLines(path):
         if not isinstance(each, Damaged):
             yield each
         elif not salvage:
             raise each
-
-
-def read_grip(path: Path, salvage: bool = False) -> dict[str, Any]:
-    """The gripper's rows in the recording of a grasp: {column: array}, NaN where empty; of any other recording an empty dictionary."""
-    columns: list[str] | None = None
-    rows: list[list[Any]] = []
-    for number, line, torn in _undamaged(path, salvage):
-        if not line.startswith(GRIP_ROW):
-            continue
-        cells = line[len(GRIP_ROW) :].split(",")
-        if columns is None:
-            if cells[0] != "time_us" or "state" not in cells:
-                raise InputError(f"{path}:{number}: a row of the gripper before its header; record again")
-            columns = cells
-            continue
-        try:
-            if torn:
-                raise InputError(f"{path}:{number}: the last line is torn; use --salvage to skip the line")
-            rows.append(_grip_values(path, number, columns, cells))
-        except InputError:
-            if not salvage:
-                raise
-    if columns is None or not rows:
-        return {}
-    return {name: np.array(values, dtype=None if name in GRIP_WORDS else float) for name, values in zip(columns, zip(*rows))}
 
 
 def read_run(path: Path | None) -> dict[str, Any]:

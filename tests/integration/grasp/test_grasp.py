@@ -20,7 +20,7 @@ FINGERTIP, FAKE_CELL, TIME_KEEPER = (os.path.abspath(path) for path in sys.argv[
 PLOT_PATIENCE_s = 300
 PYTHON_TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"
 sys.path[:0] = [str(PYTHON_TOOLS), str(pathlib.Path(__file__).resolve().parents[2] / "support")]
-from fingertip import files  # noqa: E402
+from fingertip import files, grip_file  # noqa: E402
 from simulated_terminal import Terminal  # noqa: E402
 from world_case import WorldCase  # noqa: E402
 
@@ -89,7 +89,7 @@ class GraspTest(WorldCase):
         self.fail((words, lines, process.communicate()))
 
     def rows(self):
-        return files.read_grip(self.csv)
+        return grip_file.read_grip(self.csv)
 
     def events(self):
         lines = files.read_lines(self.csv)
@@ -464,14 +464,14 @@ class Recorded(GraspTest):
         number = text[: text.index("# grip: ", text.index(",holding,") - 40)].count("\n") + 1
         for state in ("placing", "handing"):
             pathlib.Path(self.csv).write_text(text.replace(",holding,", f",{state},", 1), encoding="utf-8")
-            self.assertIn(state, files.read_grip(self.csv)["state"])
+            self.assertIn(state, grip_file.read_grip(self.csv)["state"])
         pathlib.Path(self.csv).write_text(text.replace(",holding,", ",hodling,", 1), encoding="utf-8")
         _, err = self.run_cli("replay", self.csv, "--speed", "max", status=1)
         self.assertRegex(err, rf':{number}: state is "hodling"; use --salvage')
         self.run_cli("replay", self.csv, "--speed", "max", "--salvage")
         with self.assertRaisesRegex(files.InputError, rf":{number}: "):
-            files.read_grip(self.csv)
-        self.assertEqual(len(files.read_grip(self.csv, salvage=True)["time_us"]), len(rows["time_us"]) - 1)
+            grip_file.read_grip(self.csv)
+        self.assertEqual(len(grip_file.read_grip(self.csv, salvage=True)["time_us"]), len(rows["time_us"]) - 1)
 
 
 class Live(GraspTest):

@@ -20,7 +20,7 @@ import numpy as np
 FINGERTIP, FINGERTIP_SIMULATE, TIME_KEEPER, TABLES = (os.path.abspath(path) for path in sys.argv[1:5])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
-from fingertip import files  # noqa: E402
+from fingertip import files, grip_file  # noqa: E402
 from world_case import WorldCase  # noqa: E402
 
 PATIENCE_s = 60
@@ -187,7 +187,7 @@ class Course(CellTest):
         lifted = truth["lifted_mm"] > 9.99
         self.assertGreater(truth["load_N"][lifted].min(), 0.5)  # carried all the time
         # What was recorded is what was.
-        rows = files.read_grip(self.csv)
+        rows = grip_file.read_grip(self.csv)
         self.assertLess({"approach", "squeeze", "holding", "slipping"}, set(rows["state"]))
         with open(self.csv, encoding="utf-8") as file:
             zero_us = int(next(line for line in file if line.startswith("# host_zero_us: ")).split()[-1])
@@ -239,7 +239,7 @@ class Again(CellTest):
             self.assertEqual(process.wait(), DONE, self.said())
         self.world.close()
         self.begin_world()
-        self.assertIn("slipping", set(files.read_grip(self.csv)["state"]))
+        self.assertIn("slipping", set(grip_file.read_grip(self.csv)["state"]))
         return [*(pathlib.Path(path).read_bytes() for path in (self.csv, self.truth_csv)), self.said()]
 
     def test_the_same_grasp_gives_the_same_bytes(self):

@@ -16,7 +16,7 @@ import unittest
 FINGERTIP, FINGERTIP_SIMULATE, TABLES = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
-from fingertip import files  # noqa: E402
+from fingertip import grip_file  # noqa: E402
 from world_case import WorldCase  # noqa: E402
 
 # A machine that is held up for less than that changes nothing of what is asked here.
@@ -62,7 +62,7 @@ class Stopped(WorldCase):
         _, err = tool.communicate()
         self.assertEqual(tool.returncode, 0, err)
         self.assertIn("the gripper keeps its position", err)
-        rows = files.read_grip(self.csv)
+        rows = grip_file.read_grip(self.csv)
         self.assertNotIn("fault", set(rows["state"]))
         lasted_s = (rows["time_us"][1:] - rows["time_us"][:-1]).max() / 1e6
         self.assertGreater(lasted_s, 0.9 * STOPPED_s, "the tool was not stopped")

@@ -19,7 +19,7 @@ import numpy as np
 SIMULATED, FAKE_CELL, TIME_KEEPER, GRIP_TABLE, FINGERTIP, TABLES = (os.path.abspath(path) for path in sys.argv[1:7])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
-from fingertip import BadValueError, files, grip  # noqa: E402
+from fingertip import BadValueError, files, grip, grip_file  # noqa: E402
 from fingertip.wire import Contact  # noqa: E402
 from readme_example import environment_of, simulated  # noqa: E402
 from world_case import WorldCase  # noqa: E402
@@ -86,7 +86,7 @@ class Replayed(WorldCase):
 
     def test_the_frames_of_a_grasp_give_its_commands(self):
         self.record()
-        rows = files.read_grip(self.csv)
+        rows = grip_file.read_grip(self.csv)
         made = grip.Grip(TRAITS)
         requested, course, off_mm = False, [], []
         for time_us, kind, what in sorted(self.inputs(rows), key=lambda each: each[:2]):

@@ -15,7 +15,7 @@ import unittest
 import numpy as np
 from cli_case import FAKE_DEVICE as SIMULATE
 from cli_case import CliTest
-from fingertip import files
+from fingertip import files, grip_file
 
 TABLES = os.path.abspath(sys.argv[4])
 LEFT, RIGHT = "00000000000CE110", "00000000000CE111"
@@ -149,7 +149,7 @@ class Lifts(SimulateTest):
     def test_grasp_finds_two_and_the_gripper(self):
         with self.simulated("--lift", says=r"[0-9.]+ s: lift\n"):
             self.run_cli("grasp", "--gripper", "2f85", "--gripper-port", "sim:gripper", "--seconds", "8", "-o", self.csv)
-        self.assertIn("holding", set(files.read_grip(self.csv)["state"]))
+        self.assertIn("holding", set(grip_file.read_grip(self.csv)["state"]))
 
 
 if __name__ == "__main__":
