@@ -7,19 +7,10 @@
  * One fault is beyond the sensor's protocol: the 24-bit results of conversions carry no check, so
  * bits inverted there go unseen. For these only the return to good frames is demanded: at the next
  * frame, or after the next temperature conversion. */
-#include "app/app.h"
 #include "common/contact_flags.h"
-#include "native/native_cdc.h"
-#include "native/native_flash.h"
-#include "native/native_port.h"
-#include "native/sim_array.h"
-#include "port/port.h"
-#include "support/unit.h"
-#include "wire/packet.h"
+#include "unit/app/app_rig.h"
 
-#include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 enum { SENSORS = 15, ALL = (1 << SENSORS) - 1 };
 
@@ -34,10 +25,6 @@ enum { GOOD_FRAMES = 20 };
 /* Time stamps are exact to half of the 5 % that the firmware adds to the conversion: 54 us. */
 #define SLOPE_Pa_per_us 0.04
 #define TOLERANCE_Pa (1.0 + 54 * SLOPE_Pa_per_us)
-
-static struct app app;
-static struct sim_array array;
-static struct wire_receiver receiver;
 
 static struct {
   uint32_t expected; /* bitmap of sensors */
@@ -64,12 +51,6 @@ static double pressure_Pa(void *context, unsigned sensor, uint64_t t_us) {
   return 101000.0 + 500.0 * sensor + (rests ? 0 : SLOPE_Pa_per_us * triangle_us);
 }
 
-static void on_event(void *context) { app_on_event(context); }
-
-static void main_round(void *context) { app_run(context); }
-
-static uint64_t bus_next_us(const void *context) { return sim_array_next_event_us(context); }
-
 static void look_at(const struct wire_packet *packet) {
   const struct wire_raw *raw = &packet->body.raw;
   seen.frames++;
@@ -93,13 +74,6 @@ static void look_at(const struct wire_packet *packet) {
   seen.good_in_a_row = right && trusted == seen.expected ? seen.good_in_a_row + 1 : 0;
 }
 
-static void send(struct wire_packet *packet) {
-  uint8_t frame[WIRE_MAX_FRAME_BYTES];
-  size_t length;
-  TEST_ASSERT_EQUAL_INT(FT_OK, wire_encode(wire_find_layout(wire_commands, packet->type), packet, frame, &length));
-  TEST_ASSERT_EQUAL_INT(FT_OK, native_cdc_send(frame, length));
-}
-
 static void run_until(uint64_t t_us) {
   TEST_ASSERT_EQUAL_INT(NATIVE_TIME_UP, native_run_until(t_us, main_round, &app));
   uint8_t bytes[512];
@@ -114,24 +88,16 @@ static void run_until(uint64_t t_us) {
 }
 
 static void power_up(void) {
-  native_start(false);
-  native_flash_reset(1);
-  native_cdc_reset();
-  wire_receiver_init(&receiver, wire_all_layouts);
+  rig_start();
   memset(&seen, 0, sizeof seen);
   seen.expected = ALL;
-  sim_array_init(&array, SENSORS, 1);
   array.world.pressure_Pa = pressure_Pa;
+  array.noise = 0;
   for (unsigned k = 0; k < SENSORS; k++) {
     array.d2[k] = 8077636 + 1000 * k; /* 13 to 20 degC: with and without second order */
   }
-  native_set_event_source(bus_next_us, &array);
-  port_set_event_handler(on_event, &app);
-  app_start(&app, sim_array_bus(&array));
   native_cdc_open();
-  struct wire_packet stream = {.type = WIRE_CMD_STREAM};
-  stream.body.cmd_stream.streams = WIRE_STREAM_RAW;
-  send(&stream);
+  send_packet(&COMMAND(STREAM, stream, WIRE_STREAM_RAW));
 }
 
 void setUp(void) {
