@@ -73,14 +73,11 @@ test('a stack of core 1 that grows into its guard parks it', () => {
   kill(bench, ({ core }) => (core.registers[13] = 0x2003fff0));
 });
 
-for (const [when, isSo] of [
-  ['sleeps', (second) => !second.isAwake],
-  ['works', (second) => second.isAwake],
-]) {
+for (const [when, isAwake] of Object.entries({ sleeps: false, works: true })) {
   test(`a USB suspend while core 1 ${when}: both cores sleep, and go on after the resume`, () => {
     const bench = newBench();
     const { host, chip, client } = bench.machine;
-    bench.until(() => isSo(bench.second), 20, 'such a moment');
+    bench.until(() => bench.second.isAwake === isAwake, 20, 'such a moment');
     host.suspend();
     bench.run(20);
     const before = [bench.second.cycles, chip.core0.cycles];

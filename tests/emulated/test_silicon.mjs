@@ -50,10 +50,7 @@ test('an abort of the I2C controller, whose FIFO stays flushed until it is told,
 });
 
 for (const name of BOARDS) {
-  for (const [type, limit_ms] of [
-    ['usb_deaf', 1000],
-    ['usb_dead', 1500],
-  ]) {
+  for (const [type, limit_ms] of Object.entries({ usb_deaf: 1000, usb_dead: 1500 })) {
     test(`${name}: a USB controller hung as by erratum E15 (${type}) is reset and comes back`, (t) => {
       const from_s = 0.2;
       const bench = new Bench(name, { faults: [{ type, from_s }] });

@@ -81,11 +81,7 @@ for (const [what, region, act] of [
 const READ_ONLY = `REG(0xe000ed9c) = 0x20000000 | 16 | 0; REG(0xe000eda0) = 6 << 24 | 1 << 17 | 0xfc00 | 17 << 1 | 1;
   REG(0xe000ed9c) = 0x20010000 | 16 | 1; REG(0xe000eda0) = 6 << 24 | 1 << 17 | 0xfe00 | 14 << 1 | 1; REG(0xe000ed94) = 5;`;
 
-for (const [at, last] of [
-  ['0x20010ffc', 1],
-  ['0x20008000', 1],
-  ['0x20011000', 2],
-]) {
+for (const [at, last] of Object.entries({ '0x20010ffc': 1, '0x20008000': 1, '0x20011000': 2 })) {
   test(`a write to ${at}, where memory is read-only up to 0x20011000, ${last === 1 ? 'faults' : 'does not'}; reading does not`, () => {
     const { results } = run(`void isr(void) { RESULT(1) = REG(${at}); done(); }
       void main(void) { REG(${at}) = 7; RESULT(1) = 1; ${READ_ONLY} RESULT(0) = REG(${at}); REG(${at}) = 8; RESULT(1) = 2; done(); }`);

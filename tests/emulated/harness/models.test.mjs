@@ -268,11 +268,8 @@ test('scenario: temperature column', () => {
 });
 
 test('scenario: the truth of a tangential force stands beside the temperature, in any order', () => {
-  for (const [names, cells] of [
-    ['Qx_N,Qy_N', '1,2'],
-    ['Qx_N,Qy_N,temperature_degC', '1,2,20'],
-    ['temperature_degC,Qy_N,Qx_N', '20,1,2'],
-  ]) {
+  const rows = { 'Qx_N,Qy_N': '1,2', 'Qx_N,Qy_N,temperature_degC': '1,2,20', 'temperature_degC,Qy_N,Qx_N': '20,1,2' };
+  for (const [names, cells] of Object.entries(rows)) {
     const s = scenario('# fingertip-scenario 1', `${HEADER},${names}`, `${row(0, 7)},${cells}`);
     assert.equal(s.at_ns(14, 0).temperature_degC, names.includes('temperature') ? 20 : 25);
     assert.equal(s.at_ns(14, 0).pressure_Pa, 101332);
