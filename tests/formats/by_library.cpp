@@ -15,15 +15,13 @@
 using namespace fingertip;
 using nlohmann::json;
 
-namespace {
-
 struct Numbers {
   json &to;
   template <typename Value> void operator()(const std::string &name, const Value &value) { to[name] = value; }
   void operator()(const std::string &name, std::uint64_t value) { to[name] = std::to_string(value); }
 };
 
-json packet_json(const wire_packet &packet) {
+static json packet_json(const wire_packet &packet) {
   json told = {{"sequence", packet.sequence}, {"t_us", packet.t_us}};
   wire_packet copy = packet;
   if (packet.type == WIRE_CONTACT) {
@@ -53,7 +51,7 @@ json packet_json(const wire_packet &packet) {
   return {{"other", told}};
 }
 
-json recording_json(const std::string &path, bool salvage, const std::string &device, const json &part) {
+static json recording_json(const std::string &path, bool salvage, const std::string &device, const json &part) {
   json rows = json::array(), packets = json::array(), events = json::array(), info;
   const TimeSpan interval = part.is_null() ? TimeSpan() : TimeSpan{part[0], part[1]};
   RecordingReader reader(path, salvage, device, interval);
@@ -80,7 +78,7 @@ json recording_json(const std::string &path, bool salvage, const std::string &de
           {"info", info}, {"has_end", reader.has_end()}, {"skipped", reader.skipped_lines()}};
 }
 
-json stream_json(const std::string &path) {
+static json stream_json(const std::string &path) {
   std::ifstream file(path, std::ios::binary);
   const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
   json packets = json::array();
@@ -97,14 +95,14 @@ json stream_json(const std::string &path) {
 }
 
 /* "osr=300" as the command that it becomes. */
-json setting_json(const std::string &text) {
+static json setting_json(const std::string &text) {
   wire_info now{};
   now.slip_threshold_mm = 1;
   now.slip_window_ms = 100;
   return hex(frame_bytes(setting_commands({setting_from_text(text)}, now).at(0)));
 }
 
-const char *kind_of(ErrorCode code) {
+static const char *kind_of(ErrorCode code) {
   switch (code) {
   case ErrorCode::not_a_recording:
   case ErrorCode::unread_kind:
@@ -125,7 +123,7 @@ const char *kind_of(ErrorCode code) {
   }
 }
 
-template <typename Work> json answered(const Work &work) {
+template <typename Work> static json answered(const Work &work) {
   try {
     return work();
   } catch (const Error &error) {
@@ -134,7 +132,7 @@ template <typename Work> json answered(const Work &work) {
 }
 
 /* Why all fingertips of a file together are refused, as a reader of all of them has it; null: they are not. */
-json refusal_of_all(const std::string &path) {
+static json refusal_of_all(const std::string &path) {
   return answered([&]() -> json {
     RecordingReader reader(path, false, open_lines(path));
     while (reader.next()) {
@@ -143,7 +141,7 @@ json refusal_of_all(const std::string &path) {
   });
 }
 
-json answer_to(const json &job) {
+static json answer_to(const json &job) {
   const std::string kind = job["kind"], input = job["input"], device = job["device"];
   json answer = answered([&] {
     return kind == "recording" ? recording_json(input, job["salvage"], device, job.value("part", json()))
@@ -157,8 +155,6 @@ json answer_to(const json &job) {
   }
   return answer;
 }
-
-} // namespace
 
 int main(int count, char **words) {
   if (count != 2) {

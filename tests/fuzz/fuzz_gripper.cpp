@@ -11,10 +11,8 @@
 using namespace fingertip;
 using Bytes = std::vector<std::uint8_t>;
 
-namespace {
-
 // Modbus over serial line 1.02, 6.2.2.
-Bytes with_crc(Bytes bytes) {
+static Bytes with_crc(Bytes bytes) {
   unsigned crc = 0xFFFF;
   for (const std::uint8_t byte : bytes) {
     crc ^= byte;
@@ -118,12 +116,12 @@ private:
   std::thread thread_;
 };
 
-void check(const GripperStatus &status, const GripperTraits &traits) {
+static void check(const GripperStatus &status, const GripperTraits &traits) {
   FUZZ_CHECK(status.width_mm >= 0 && status.width_mm <= traits.stroke_mm);
   FUZZ_CHECK(status.current_A >= 0 && status.current_A <= 1000);
 }
 
-void talk(const std::string &port, bool modbus, fuzz_input questions, const Line &line) {
+static void talk(const std::string &port, bool modbus, fuzz_input questions, const Line &line) {
   GripperWay way;
   way.model = modbus ? "2f85" : "sts3215";
   way.port = port;
@@ -149,7 +147,7 @@ void talk(const std::string &port, bool modbus, fuzz_input questions, const Line
 }
 
 // Bytes to packets: in one piece or in two, the packets are the same; written, they are read again.
-void check_packets(const Bytes &bytes, std::size_t cut) {
+static void check_packets(const Bytes &bytes, std::size_t cut) {
   const auto taken = [](Bytes rest, std::vector<Bytes> &packets, std::size_t &skipped) {
     while (const auto packet = feetech::take_packet(&rest, &skipped)) {
       packets.push_back(feetech::encoded(*packet));
@@ -174,8 +172,6 @@ void check_packets(const Bytes &bytes, std::size_t cut) {
   }
   FUZZ_CHECK(total == bytes.size());
 }
-
-} // namespace
 
 void fuzz_one(const uint8_t *bytes, size_t length) {
   fuzz_input input = {bytes, bytes + length};

@@ -7,8 +7,6 @@
 
 using namespace fingertip;
 
-namespace {
-
 // Nothing waits: each reading takes what the input has next, and at its end the port is gone.
 class Said : public Transport {
 public:
@@ -70,8 +68,6 @@ private:
   wire_receiver commands_;
   wire_packet asked_{};
 };
-
-} // namespace
 
 void fuzz_one(const uint8_t *bytes, size_t length) {
   fuzz_input input = {bytes, bytes + length};

@@ -10,8 +10,6 @@
 
 using namespace fingertip;
 
-namespace {
-
 constexpr std::size_t QUEUE_BYTES = 4096;
 
 struct Program {
@@ -189,7 +187,5 @@ private:
   std::uint16_t sequence_ = 0; // of the fingertip
   bool said_anything_ = false;
 };
-
-} // namespace
 
 void fuzz_one(const uint8_t *bytes, size_t length) { Scene({bytes, bytes + length}).run(); }

@@ -13,13 +13,11 @@ extern "C" {
 
 using namespace fingertip;
 
-namespace {
-
 using Bytes = std::vector<std::uint8_t>;
 constexpr std::size_t BLOCK_BYTES = 512, PAGE_BYTES = 256, PAGE_AT = 32;
 
 // CRC-32/MPEG-2, as the boot ROM has it.
-std::uint32_t boot2_crc(const std::uint8_t *bytes, std::size_t length) {
+static std::uint32_t boot2_crc(const std::uint8_t *bytes, std::size_t length) {
   std::uint32_t crc = 0xFFFFFFFF;
   for (std::size_t i = 0; i < length; i++) {
     crc ^= static_cast<std::uint32_t>(bytes[i]) << 24;
@@ -30,7 +28,7 @@ std::uint32_t boot2_crc(const std::uint8_t *bytes, std::size_t length) {
   return crc;
 }
 
-Bytes file_of(const Bytes &flash) {
+static Bytes file_of(const Bytes &flash) {
   Bytes file(flash.size() / PAGE_BYTES * BLOCK_BYTES);
   const std::size_t count = flash.size() / PAGE_BYTES;
   const std::uint32_t crc = crc32_iso_hdlc(flash.data(), flash.size());
@@ -55,11 +53,9 @@ Bytes file_of(const Bytes &flash) {
   return file;
 }
 
-bool is_word(const std::string &text) {
+static bool is_word(const std::string &text) {
   return !text.empty() && std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c <= '~'; });
 }
-
-} // namespace
 
 void fuzz_one(const uint8_t *bytes, size_t length) {
   fuzz_input input = {bytes, bytes + length};

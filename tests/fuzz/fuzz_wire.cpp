@@ -7,15 +7,13 @@
 
 using namespace fingertip;
 
-namespace {
-
 struct Heard {
   std::vector<Bytes> packets; // encoded again
   LineStatistics statistics;
 };
 
 // In pieces of these lengths, over and over.
-Heard decoded(const Bytes &line, const std::vector<std::size_t> &pieces) {
+static Heard decoded(const Bytes &line, const std::vector<std::size_t> &pieces) {
   Decoder decoder;
   Heard heard;
   for (std::size_t at = 0, i = 0; at < line.size(); i++) {
@@ -29,7 +27,7 @@ Heard decoded(const Bytes &line, const std::vector<std::size_t> &pieces) {
 }
 
 // What C++ opens, C decodes, and both stuff alike.
-void check_frame(const Bytes &frame, LineStatistics &statistics) {
+static void check_frame(const Bytes &frame, LineStatistics &statistics) {
   const auto envelope = Envelope::opened(frame);
   if (frame.size() > WIRE_MAX_FRAME_BYTES) {
     statistics.format_errors++;
@@ -57,8 +55,6 @@ void check_frame(const Bytes &frame, LineStatistics &statistics) {
     FUZZ_CHECK(fuzz::encoded(packet) == again);
   }
 }
-
-} // namespace
 
 void fuzz_one(const uint8_t *bytes, size_t length) {
   fuzz_input input = {bytes, bytes + length};

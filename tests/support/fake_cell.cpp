@@ -17,8 +17,6 @@
 
 using namespace fingertip;
 
-namespace {
-
 struct Object {
   std::atomic<double> width_mm{40}, load_N{0}, stiffness_N_mm{2};
   std::atomic<bool> slides{false}, over{false};
@@ -103,7 +101,7 @@ private:
 };
 
 // Of standard input, which is waited for as for everything else in this world.
-bool next_line(std::string *line) {
+static bool next_line(std::string *line) {
   static std::string came;
   for (;;) {
     const std::size_t end = came.find('\n');
@@ -124,8 +122,6 @@ bool next_line(std::string *line) {
     }
   }
 }
-
-} // namespace
 
 int main(int argc, char **argv) {
   if (argc < 2) {

@@ -52,12 +52,10 @@
 #include <optional>
 #include <termios.h>
 
-namespace {
-
 using Time = fingertip::HostTime;
 using std::chrono::milliseconds;
 
-volatile std::sig_atomic_t ended = 0;
+static volatile std::sig_atomic_t ended = 0;
 
 class FakeDevice {
 public:
@@ -422,8 +420,6 @@ private:
   std::vector<wire_packet> recorded_; /* to play */
   std::size_t played_ = 0;
 };
-
-} // namespace
 
 int main(int argc, char **argv) {
   if (argc < 2) {

@@ -33,8 +33,6 @@ using fingertip::test::MOST_DESCRIPTORS;
 using fingertip::test::Order;
 using fingertip::test::Turn;
 
-namespace {
-
 constexpr std::int64_t BEGIN_us = 1'000'000'000;
 constexpr int PATIENCE_ms = 120'000;   // of real time, with a thread that runs
 constexpr int SIGNAL_ms = 5'000;       // of real time, until a signal has arrived
@@ -397,8 +395,6 @@ private:
   });
   keeper.run();
 }
-
-} // namespace
 
 int main(int argc, char **argv) {
   if (argc >= 3 && std::strcmp(argv[1], "--run") == 0) {

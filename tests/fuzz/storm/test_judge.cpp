@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 
 namespace storm {
-namespace {
 
 constexpr std::uint64_t FRAME_us = 5000, ZERO_us = 1000;
 
@@ -131,7 +130,7 @@ private:
   std::uint32_t frame_ = 0, sent_ = 0, dropped_ = 0, taken_ = 0, skipped_ = 0;
 };
 
-std::string found(Line &line) {
+static std::string found(Line &line) {
   std::string kinds;
   for (const Finding &finding : line.judge().findings()) {
     kinds += finding.kind + "; ";
@@ -273,5 +272,4 @@ TEST(Judge, RecoveryIsFiveGoodFramesInARow) {
   EXPECT_TRUE(line.judge().has_recovered());
 }
 
-} // namespace
 } // namespace storm

@@ -150,16 +150,15 @@ class Programs(CellTest):
             self.assertAlmostEqual(self.now()["width_mm"], 44, delta=1)
 
     def test_killed_it_leaves_no_process_behind(self):
-        with contextlib.suppress(BrokenPipeError):
-            with self.cell():
-                children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
-                self.assertEqual(len(children), 2)
-                ends = [os.pidfd_open(int(child)) for child in children]
-                self.process.kill()
-                self.process.wait()
-                for end in ends:
-                    self.assertTrue(select.select([end], [], [], PATIENCE_s)[0], "a fingertip's process lives on")
-                    os.close(end)
+        with contextlib.suppress(BrokenPipeError), self.cell():
+            children = pathlib.Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children").read_text().split()
+            self.assertEqual(len(children), 2)
+            ends = [os.pidfd_open(int(child)) for child in children]
+            self.process.kill()
+            self.process.wait()
+            for end in ends:
+                self.assertTrue(select.select([end], [], [], PATIENCE_s)[0], "a fingertip's process lives on")
+                os.close(end)
 
 
 class Course(CellTest):

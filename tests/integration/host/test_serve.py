@@ -63,20 +63,19 @@ class ServeTest(CliTest):
 class Sharing(ServeTest):
     def test_all_at_once_and_each_recording_is_what_the_line_said(self):
         line = self.path("line.ftr")
-        with self.device("frames=700", "health=50", f"tap={line}"):
-            with self.served():
-                first, first_csv = self.recording("first.csv", "--raw-bytes", self.ftr)
-                second, second_csv = self.recording("second.csv")
-                monitor = self.start("monitor", "--until-gone")
-                commands = f"tare, set osr=256, set rate=400, info, list, set limit=0.5 --keep, info --device {SERIAL.lower()}"
-                commands += ", set slip_threshold=0.25"
-                for process in [self.start(*command.split()) for command in commands.split(", ")]:
-                    self.finished(process)
-                out = self.run_cli("info")[0]
-                for said in ("osr 256", "rate_mHz 400000", "location_limit_mm 0.5", "slip_threshold_mm 0.25", f"port {self.socket_of()}"):
-                    self.assertIn(said, re.sub(" +", " ", out))
-                for process in (first, second, monitor):
-                    self.finished(process)
+        with self.device("frames=700", "health=50", f"tap={line}"), self.served():
+            first, first_csv = self.recording("first.csv", "--raw-bytes", self.ftr)
+            second, second_csv = self.recording("second.csv")
+            monitor = self.start("monitor", "--until-gone")
+            commands = f"tare, set osr=256, set rate=400, info, list, set limit=0.5 --keep, info --device {SERIAL.lower()}"
+            commands += ", set slip_threshold=0.25"
+            for process in [self.start(*command.split()) for command in commands.split(", ")]:
+                self.finished(process)
+            out = self.run_cli("info")[0]
+            for said in ("osr 256", "rate_mHz 400000", "location_limit_mm 0.5", "slip_threshold_mm 0.25", f"port {self.socket_of()}"):
+                self.assertIn(said, re.sub(" +", " ", out))
+            for process in (first, second, monitor):
+                self.finished(process)
         direct = self.path("direct.csv")
         self.run_cli("replay", line, "--to-csv", direct)
         expected = self.rows_but_numbers(direct)

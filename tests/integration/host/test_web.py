@@ -322,13 +322,12 @@ class Lift(SimulationsCase):
 
 class Line(SimulationsCase):
     def test_it_is_a_line_to_the_fingertip(self):
-        with self.served(), self.run_tool("simulate"):
-            with self.line() as line:
-                status, said = self.answered(f"/simulated/line?client={ONE}", wire.encode(wire.Packet(7, 0, AskInfo())))
-                self.assertEqual((status, said), (200, ""))
-                came = b""
-                while b"native" not in came:  # the name of its board
-                    came += line.read1()
+        with self.served(), self.run_tool("simulate"), self.line() as line:
+            status, said = self.answered(f"/simulated/line?client={ONE}", wire.encode(wire.Packet(7, 0, AskInfo())))
+            self.assertEqual((status, said), (200, ""))
+            came = b""
+            while b"native" not in came:  # the name of its board
+                came += line.read1()
 
     def test_it_ends_with_the_simulation(self):
         with self.served():

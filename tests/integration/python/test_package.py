@@ -471,9 +471,8 @@ class Together(DeviceTest):
 
 class WithoutPandas(unittest.TestCase):
     def test_said_what_to_install(self):
-        with mock.patch.dict(sys.modules, {"pandas": None}):
-            with self.assertRaisesRegex(ImportError, r"pip install pandas$"):
-                fingertip.Block([]).to_pandas()
+        with mock.patch.dict(sys.modules, {"pandas": None}), self.assertRaisesRegex(ImportError, r"pip install pandas$"):
+            fingertip.Block([]).to_pandas()
 
     def test_import_needs_no_port(self):
         with mock.patch.dict(sys.modules, {"serial": None}):

@@ -28,8 +28,6 @@
 using namespace eprosima::fastdds::dds;
 namespace rtps = eprosima::fastrtps::rtps;
 
-namespace {
-
 constexpr uint32_t LARGEST_bytes = 8192;
 constexpr char LOOPBACK[] = "127.0.0.1";
 
@@ -87,7 +85,7 @@ private:
   std::ofstream file_;
 };
 
-DomainParticipantQos loopback_only() {
+static DomainParticipantQos loopback_only() {
   DomainParticipantQos qos = PARTICIPANT_QOS_DEFAULT;
   auto transport = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
   transport->interfaceWhiteList.emplace_back(LOOPBACK);
@@ -99,7 +97,7 @@ DomainParticipantQos loopback_only() {
   return qos;
 }
 
-int listen(int domain, const std::string &folder, const std::vector<std::string> &wanted) {
+static int listen(int domain, const std::string &folder, const std::vector<std::string> &wanted) {
   auto *factory = DomainParticipantFactory::get_instance();
   DomainParticipant *participant = factory->create_participant(static_cast<DomainId_t>(domain), loopback_only());
   if (!participant) {
@@ -131,8 +129,6 @@ int listen(int domain, const std::string &folder, const std::vector<std::string>
   factory->delete_participant(participant);
   return 0;
 }
-
-} // namespace
 
 int main(int argc, char **argv) {
   if (argc < 4) {

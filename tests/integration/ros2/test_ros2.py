@@ -169,13 +169,14 @@ class Command(unittest.TestCase):
         with (
             mock.patch.dict(os.environ, {**LOCAL, "XDG_RUNTIME_DIR": str(self.folder)}),
             plugged_in(FAKE_DEVICE, self.folder / "tty") as port,
+            Fingertip(port) as fingertip,
+            ros2.Publisher() as publisher,
         ):
-            with Fingertip(port) as fingertip, ros2.Publisher() as publisher:
-                publisher.add(fingertip)
-                ears.wait_until_they_hear(publisher)
-                ears.process.send_signal(signal.SIGSTOP)
-                for frame, _ in zip(fingertip, range(20)):
-                    publisher.frame(frame)
+            publisher.add(fingertip)
+            ears.wait_until_they_hear(publisher)
+            ears.process.send_signal(signal.SIGSTOP)
+            for frame, _ in zip(fingertip, range(20)):
+                publisher.frame(frame)
         self.assertEqual(publisher.sent[TOPIC + "contact"], 20)
         ears.process.send_signal(signal.SIGCONT)
         ears.close()
