@@ -102,14 +102,6 @@ def silicon(build):
     return json.loads(run("node", EMULATED / "harness/figures.mjs", build.parent, *tools_of(build), build / "sensors" / SENSOR))
 
 
-@job("reliability", ("sync_error_us_max", "<=", 1), ("sync_alignment_us", "<=", 2))
-def shared_clock(build):
-    """Edges at the sync pins of both boards, and two fingertips on one wire."""
-    stamps = figures_of("node", EMULATED / "test_sync.mjs", build.parent, *tools_of(build))
-    wire = ("--image", image_of(build.parent, "pico_mux"), "--support", build / "tests/support", "--node", "node", "--report")
-    return stamps | figures_of("/usr/bin/python3", EMULATED / "test_sync_wire.py", *wire)
-
-
 @job("reliability", ("ubsan_calls", ">=", 1e8), ("ubsan_findings", "<=", 0))
 def undefined(build):
     """Inputs of any bits for all public functions of fit, contact and condition, under the sanitizers."""

@@ -3,7 +3,6 @@
 # real time: a browser
 import contextlib
 import gzip
-import json
 import pathlib
 import statistics
 import types
@@ -13,7 +12,7 @@ import numpy as np
 import wasm_parity
 from browser import Browser, CannotRun
 from fingertips import Bench
-from nightly import ROOT, Programs, busy_s, job, run
+from nightly import Programs, busy_s, job, run
 
 from fingertip.files import InputError
 
@@ -128,18 +127,3 @@ def parity(build):
         "wasm_seconds": seconds,
         "wasm_cpu_percent": 100 * busy / seconds,
     }
-
-
-@job("web", ("simulated_frames_per_s", ">=", 1300))
-def cost(build, seconds=60):
-    """In node: what the WebAssembly weighs, and the simulated fingertip at its highest rate."""
-    folder = build / "host_tools/web/wasm"
-    files = ("core.wasm", "simulated.wasm", "objects.bin", "judges.wasm")
-    with Programs(build) as programs:
-        commands = programs.folder / "commands"
-        words = (("osr", "256"), ("rate", "max"), ("stream", "contact"))
-        commands.write_bytes(b"".join(bytes.fromhex(run(build / "tests/support/command_frame", *command)) for command in words))
-        program = ROOT / "host_tools/web/wasm/cost.mjs"
-        found = json.loads(run("node", program, folder / "simulated.wasm", folder / "objects.bin", commands, seconds))
-    sizes = {f"{name.replace('.', '_')}_kB": len(gzip.compress((folder / name).read_bytes(), 9)) / 1000 for name in files}
-    return sizes | {f"simulated_{name}": value for name, value in found.items()}
