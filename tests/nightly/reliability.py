@@ -12,7 +12,6 @@ from boards import BOARDS, PARALLEL, image_of
 from nightly import ROOT, figures_of, job, run
 from reporting import Steps
 
-from fingertip.files import InputError
 
 TESTS = ROOT / "tests"
 EMULATED = TESTS / "emulated"
@@ -29,25 +28,6 @@ def tools_of(build):
 
 def in_parallel(jobs):
     return Steps().run_all({key: (str(key), work) for key, work in jobs.items()}, os.cpu_count() or 1)
-
-
-@job("reliability", ("same_bits_presses", ">=", 10000), ("same_bits_different", "<=", 0), ("same_bits_failed", "<=", 0))
-def same_bits(build):
-    """Fits and grasps on a Cortex-M0+ (the RP2040's, emulated; QEMU's), a Cortex-M4F (QEMU) and this host, with every press."""
-    host, board = build / "tests/emulated/fit_bits/fit_bits", build.parent / BOARDS[0] / "fit_bits"
-    images = ("--host", host, "--m4f", f"{host}_m4f.elf", "--m0", f"{board}_m0.elf", "--rp2040", f"{board}_rp2040.bin")
-    test = EMULATED / "fit_bits/test_fit_bits.py"
-    words = ["/usr/bin/python3", test, *images, "--qemu", "qemu-system-arm", "--node", "node", "SameBits"]
-    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False)
-    compared = [int(count) for count in re.findall(r"same bits: (\d+) presses", done.stdout)]
-    if not compared:
-        raise InputError(f"{test.name} compared nothing: {done.stderr.strip()[-500:]}")
-    return {
-        "same_bits_presses": max(compared),
-        "same_bits_compared": sum(compared),
-        "same_bits_different": sum(int(count) for count in re.findall(r"(\d+) of \d+ differ", done.stderr)),
-        "same_bits_failed": done.returncode,
-    }
 
 
 @job(
