@@ -17,10 +17,10 @@ class Usage(CliTest):
     def test_help_and_version(self):
         self.assertRegex(self.run_cli("--version")[0], r"^fingertip \d+\.\d+\.\d+\n$")
         commands = re.findall(r"^  (\w+) ", self.run_cli("--help")[0].split("Subcommands:")[1], re.M)
-        every = "list info doctor monitor record replay convert grasp gripper tare calibrate pad set serve simulate validate web flash rule loader"
+        every = "list info doctor fit monitor record replay convert grasp gripper tare calibrate pad set serve simulate validate web flash rule loader"
         self.assertEqual(sorted(commands), sorted(every.split()))
         pages = {"": self.run_cli("--help")[0]}
-        for command in set(commands) - {"simulate", "validate"}:  # whose programs are others: test_simulate.py, test_validate.py
+        for command in set(commands) - {"simulate", "validate", "fit"}:  # programs of others, with tests of their own
             pages[command] = self.run_cli(command, "--help")[0]
         for command, page in pages.items():
             self.assertIn(f"Usage: fingertip {command}", page)
