@@ -75,7 +75,7 @@ class Tool(unittest.TestCase):
         for fault, said in (
             ("silent", "no answer from slave 9 within 50 ms; is it powered"),
             ("garbage", "look for a second program"),
-            ("damaged", "an answer is damaged \\(CRC\\)"),
+            ("damaged", "an answer is damaged \\(checksum\\)"),
             ("other_slave", "another slave answers"),
             ("refused", "refused with Modbus exception 1"),
         ):
