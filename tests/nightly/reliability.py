@@ -146,9 +146,3 @@ def storing(build):
     """Frames while the emulated chip stores."""
     sys.path.insert(0, str(EMULATED))
     return importlib.import_module("storing").storing(build, build.parent)
-
-
-@job("reliability", ("analyzer_findings", "<=", 0))
-def analysis(build):
-    """clang-tidy, clang's analyser of paths, cppcheck, gcc's -fanalyzer and the mandatory rules of MISRA C:2012 over firmware/ and boards/."""
-    return figures_of("/usr/bin/python3", TESTS / "checks/analyse.py", "--build", build.parent, "--all", "--json")
