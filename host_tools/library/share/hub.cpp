@@ -3,7 +3,6 @@
 #include "libfingertip/command.hpp"
 
 #include <algorithm>
-#include <map>
 #include <utility>
 
 extern "C" {

@@ -20,7 +20,6 @@ extern "C" {
 #include <cstdlib>
 #include <cstring>
 #include <deque>
-#include <optional>
 #include <sys/prctl.h>
 #include <unistd.h>
 #include <vector>

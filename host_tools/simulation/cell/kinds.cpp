@@ -4,7 +4,6 @@
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 namespace fingertip::cell {

@@ -5,7 +5,6 @@
 
 #include <cstdio>
 #include <iterator>
-#include <utility>
 
 namespace fingertip {
 
