@@ -3,8 +3,7 @@
 
 #include "usb/cdc.h"
 
-/* What cdc_write() holds while the host does not read, and what of the host's waits for cdc_read();
- * as in the device. */
+/* What cdc_write() holds while the host does not read, and what of the host's waits for cdc_read(); as in the device. */
 enum { NATIVE_CDC_TRANSMIT_BYTES = 4096, NATIVE_CDC_RECEIVE_BYTES = 256 };
 
 /* Detached, closed, nothing sent, nothing received, no closings counted. */
@@ -17,16 +16,13 @@ const struct cdc_identity *native_cdc_identity(void);
 void native_cdc_open(void);
 void native_cdc_close(void);
 
-/* A stalled host has the port open and reads nothing; cdc_write() fills the queue. When it goes
- * on, it gets the queue. */
+/* A stalled host has the port open and reads nothing; cdc_write() fills the queue. When it goes on, it gets the queue. */
 void native_cdc_stall(bool stalled);
 
-/* The bus falls asleep or wakes up: asleep the port is closed. It keeps what the host wants of it:
- * one that was open is so again. */
+/* The bus falls asleep or wakes up: asleep the port is closed. It keeps what the host wants of it: one that was open is so again. */
 void native_cdc_suspend(bool suspended);
 
-/* The host writes; the device gets the bytes at its next reads. FT_ERR_SPACE: the
- * device would hold off the host, none was taken. */
+/* The host writes; the device gets the bytes at its next reads. FT_ERR_SPACE: the device would hold off the host, none was taken. */
 enum ft_status native_cdc_send(const uint8_t *bytes, size_t length);
 
 /* The host asks for the loader, as by 1200 baud. */

@@ -54,20 +54,16 @@ void native_flash_reset(uint64_t seed) {
   memset(native_flash.unstable, 0, sizeof native_flash.unstable);
 }
 
-/* How far the bits have come when power is lost, of 256: those that have arrived, and those on
- * their way, which read as they like. */
+/* How far the bits have come when power is lost, of 256: those that have arrived, and those on their way, which read as they like. */
 struct progress {
   unsigned arrived, torn;
 };
 
 static struct progress some_progress(void) {
   switch (random_bits() & 3) {
-  case 0:
-    return (struct progress){0, 1}; /* hardly begun */
-  case 1:
-    return (struct progress){255, 1}; /* nearly done */
-  default:
-    return (struct progress){random_bits(), random_bits()};
+  case 0: return (struct progress){0, 1};   /* hardly begun */
+  case 1: return (struct progress){255, 1}; /* nearly done */
+  default: return (struct progress){random_bits(), random_bits()};
   }
 }
 
@@ -151,8 +147,7 @@ void port_flash_erase(unsigned sector) {
 }
 
 void port_flash_program(uint32_t at, const uint8_t *bytes, size_t length) {
-  if (length == 0 || at + length > NATIVE_FLASH_BYTES ||
-      at / PORT_FLASH_PAGE_BYTES != (at + length - 1) / PORT_FLASH_PAGE_BYTES) {
+  if (length == 0 || at + length > NATIVE_FLASH_BYTES || at / PORT_FLASH_PAGE_BYTES != (at + length - 1) / PORT_FLASH_PAGE_BYTES) {
     stop("a page's end is passed");
   }
   begin(PROGRAM, at, bytes, length, PROGRAM_POLLS);

@@ -1,7 +1,6 @@
-/* port/flash.h on the host: in memory, with power that can be lost at any step. Each beginning of an operation and each
- * poll of it is a step; an operation takes a few. What it changes when power is lost is random: some bits have changed,
- * some have not, and some read differently from now on, at each reading or at each power-up, until they are programmed
- * or erased again.
+/* port/flash.h on the host: in memory, with power that can be lost at any step. Each beginning of an operation and each poll of it is a
+ * step; an operation takes a few. What it changes when power is lost is random: some bits have changed, some have not, and some read
+ * differently from now on, at each reading or at each power-up, until they are programmed or erased again.
  *
  * What a real flash would punish stops the test program: two operations at once, bytes beyond a page. */
 #pragma once

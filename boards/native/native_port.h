@@ -42,8 +42,7 @@ enum native_end {
   NATIVE_PANIC,  /* by port_panic() */
 };
 
-/* Runs until t_us: main_round again and again, one round of a main loop that sleeps when it has
- * nothing to do. NULL: only events. */
+/* Runs until t_us: main_round again and again, one round of a main loop that sleeps when it has nothing to do. NULL: only events. */
 enum native_end native_run_until(uint64_t t_us, void (*main_round)(void *context), void *context);
 
 /* The watchdog would have struck: it was not fed for PORT_WATCHDOG_PERIOD_us, or in vain. */

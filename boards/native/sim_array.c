@@ -19,8 +19,7 @@ static uint64_t random_u64(struct sim_array *array) {
 
 static double uniform(struct sim_array *array) { return (double)(random_u64(array) >> 11) / 9007199254740992.0; }
 
-/* Libraries differ in the last bits of logarithm and cosine; these are the same on every machine.
- * Within 4e-16 of the true values. */
+/* Libraries differ in the last bits of logarithm and cosine; these are the same on every machine. Within 4e-16 of the true values. */
 
 /* u in (0, 1] */
 static double logarithm(double u) {
@@ -58,8 +57,7 @@ static double gaussian(struct sim_array *array) {
 }
 
 static double temperature_at(const struct sim_array *array, unsigned k, uint64_t t_us) {
-  return array->world.temperature_degC ? array->world.temperature_degC(array->world.context, k, t_us)
-                                       : ROOM_TEMPERATURE_degC;
+  return array->world.temperature_degC ? array->world.temperature_degC(array->world.context, k, t_us) : ROOM_TEMPERATURE_degC;
 }
 
 static uint32_t d2_at(const struct sim_array *array, unsigned k, uint64_t t_us, double error_degC) {
@@ -81,8 +79,7 @@ static uint32_t measure(void *context, int type, unsigned osr, uint64_t t_us) {
   if (array->d1[k] != 0) {
     return array->d1[k];
   }
-  double pressure_Pa =
-      array->world.pressure_Pa ? array->world.pressure_Pa(array->world.context, k, t_us) : STANDARD_PRESSURE_Pa;
+  double pressure_Pa = array->world.pressure_Pa ? array->world.pressure_Pa(array->world.context, k, t_us) : STANDARD_PRESSURE_Pa;
   if (array->noise > 0) {
     pressure_Pa += array->noise * sim_ms5840_noise_Pa(osr) * gaussian(array);
   }
@@ -96,9 +93,8 @@ void sim_array_init(struct sim_array *array, uint8_t sensor_count, uint64_t seed
   static const uint16_t EXAMPLE[6] = SIM_MS5840_EXAMPLE;
   for (unsigned k = 0; k < sensor_count; k++) {
     /* The datasheet's example, and its neighbours. */
-    const uint16_t c[6] = {(uint16_t)(EXAMPLE[0] - 37 * k), (uint16_t)(EXAMPLE[1] + 53 * k),
-                           (uint16_t)(EXAMPLE[2] + 17 * k), (uint16_t)(EXAMPLE[3] - 29 * k),
-                           (uint16_t)(EXAMPLE[4] + 41 * k), (uint16_t)(EXAMPLE[5] - 13 * k)};
+    const uint16_t c[6] = {(uint16_t)(EXAMPLE[0] - 37 * k), (uint16_t)(EXAMPLE[1] + 53 * k), (uint16_t)(EXAMPLE[2] + 17 * k),
+                           (uint16_t)(EXAMPLE[3] - 29 * k), (uint16_t)(EXAMPLE[4] + 41 * k), (uint16_t)(EXAMPLE[5] - 13 * k)};
     sim_ms5840_init(&array->sensor[k], c);
   }
 }
@@ -217,8 +213,8 @@ static void begin_transfer(struct sim_array *array, uint64_t t_us) {
   }
 }
 
-static enum ft_status start(struct sim_array *array, enum sim_array_operation operation, uint8_t command,
-                            uint8_t byte_count, uint64_t now_us) {
+static enum ft_status start(struct sim_array *array, enum sim_array_operation operation, uint8_t command, uint8_t byte_count,
+                            uint64_t now_us) {
   if (array->operation != SIM_ARRAY_IDLE) {
     return FT_ERR_BUSY;
   }
@@ -318,6 +314,5 @@ const struct array_bus *sim_array_bus(struct sim_array *array) {
 }
 
 uint64_t sim_array_next_event_us(const struct sim_array *array) {
-  return array->operation == SIM_ARRAY_IDLE || array->hangs || array->needs_recovery ? UINT64_MAX
-                                                                                     : array->transfer_end_us;
+  return array->operation == SIM_ARRAY_IDLE || array->hangs || array->needs_recovery ? UINT64_MAX : array->transfer_end_us;
 }

@@ -1,6 +1,5 @@
-/* A simulated array of MS5840 behind array_bus, with bus times like those of multiplexers and a fault on request at any
- * transfer. Time is the caller's: nothing happens but at poll(), and each transfer is then applied at the time at which
- * it ended on the bus.
+/* A simulated array of MS5840 behind array_bus, with bus times like those of multiplexers and a fault on request at any transfer. Time is
+ * the caller's: nothing happens but at poll(), and each transfer is then applied at the time at which it ended on the bus.
  *
  * Transfers are counted from 1: each broadcast of a command is one, each read of one sensor is one. After start_*
  * advance time to the earlier of *wake_us and sim_array_next_event_us(), and poll. */
@@ -89,8 +88,7 @@ struct sim_array {
  * seed: of the noise. */
 void sim_array_init(struct sim_array *array, uint8_t sensor_count, uint64_t seed);
 
-/* Draws new calibrations for every sensor, each word up to `share` (below 1) off the typical
- * part's. The sensors are as after power-up. */
+/* Draws new calibrations for every sensor, each word up to `share` (below 1) off the typical part's. The sensors are as after power-up. */
 void sim_array_vary_parts(struct sim_array *array, double share);
 
 /* The bus driver starts again, and its time at 0; the argument is the time since its last start: what was under

@@ -84,12 +84,9 @@ static bool is_read_command(uint8_t command) {
   return command == READ_ADC || (command >= READ_PROM && command < READ_PROM + 2 * SIM_MS5840_PROM_WORDS);
 }
 
-static bool is_resetting(const struct sim_ms5840 *sensor, uint64_t t_us) {
-  return !sensor->converting && t_us < sensor->busy_until_us;
-}
+static bool is_resetting(const struct sim_ms5840 *sensor, uint64_t t_us) { return !sensor->converting && t_us < sensor->busy_until_us; }
 
-bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_us, sim_ms5840_measure *measure,
-                        void *context) {
+bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_us, sim_ms5840_measure *measure, void *context) {
   settle(sensor, t_us);
   if (is_resetting(sensor, t_us)) {
     return false;
@@ -201,9 +198,7 @@ static struct compensation compensate(const uint16_t *prom, uint32_t d2) {
   return c;
 }
 
-double sim_ms5840_temperature_degC(const uint16_t *prom, uint32_t d2) {
-  return compensate(prom, d2).temperature / 100.0;
-}
+double sim_ms5840_temperature_degC(const uint16_t *prom, uint32_t d2) { return compensate(prom, d2).temperature / 100.0; }
 
 double sim_ms5840_pressure_Pa(const uint16_t *prom, uint32_t d1, uint32_t d2) {
   const struct compensation c = compensate(prom, d2);

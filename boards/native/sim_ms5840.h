@@ -1,6 +1,5 @@
-/* One simulated MS5840-02BA, or MS5837-30BA by FINGERTIP_SENSOR, as seen from its two wires: what it acknowledges,
- * answers and forgets, and when. Written from the datasheet, apart from the driver in firmware/ms58xx, so that the two
- * can be tested against each other.
+/* One simulated MS5840-02BA, or MS5837-30BA by FINGERTIP_SENSOR, as seen from its two wires: what it acknowledges, answers and forgets, and
+ * when. Written from the datasheet, apart from the driver in firmware/ms58xx, so that the two can be tested against each other.
  *
  * Behaviour: after power-up nothing but the reset command works; it takes 2.8 ms, during which the sensor acknowledges
  * nothing. A conversion takes the datasheet's maximum. Its result can be read once; without one the sensor answers 0.
@@ -17,14 +16,14 @@ enum { SIM_MS5840_PROM_WORDS = 7, SIM_MS5840_MAX_READ_BYTES = 3 };
 
 /* C1..C6 of a part: of a public dump of an MS5840, of the example of the MS5837-30BA's datasheet. */
 #if SIM_SENSOR_MS5837_30BA
-#define SIM_MS5840_TYPICAL                                                                                             \
+#define SIM_MS5840_TYPICAL                                                                                                                 \
   { 34982, 36352, 20328, 22354, 26646, 26146 }
 #define SIM_MS5840_EXAMPLE SIM_MS5840_TYPICAL
 #else
-#define SIM_MS5840_TYPICAL                                                                                             \
+#define SIM_MS5840_TYPICAL                                                                                                                 \
   { 41335, 41466, 26840, 27317, 31225, 28780 }
 /* Of the datasheet of the MS5837-02BA. */
-#define SIM_MS5840_EXAMPLE                                                                                             \
+#define SIM_MS5840_EXAMPLE                                                                                                                 \
   { 46372, 43981, 29059, 27842, 31553, 28165 }
 #endif
 
@@ -57,8 +56,7 @@ void sim_ms5840_power_cycle(struct sim_ms5840 *sensor);
 void sim_ms5840_brown_out(struct sim_ms5840 *sensor);
 
 /* A command byte that ends at t_us, alone in its transfer or before a read. False: not acknowledged. */
-bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_us, sim_ms5840_measure *measure,
-                        void *context);
+bool sim_ms5840_command(struct sim_ms5840 *sensor, uint8_t command, uint64_t t_us, sim_ms5840_measure *measure, void *context);
 
 /* The bytes that a read after command answers. False: not acknowledged. */
 bool sim_ms5840_read(struct sim_ms5840 *sensor, uint8_t command, uint8_t *bytes, unsigned count, uint64_t t_us);

@@ -9,8 +9,7 @@ enum {
   ALL_CHANNELS = (1 << BOARD_SENSORS_OF_STRIP) - 1,
   ALL_MUXES = (1 << BOARD_MUX_COUNT) - 1,
   NO_MUX = BOARD_MUX_COUNT,
-  /* UM10204 3.1.16: a device that holds SDA lets go within nine; one of them is the clock of an
-   * acknowledge, and it is not given. */
+  /* UM10204 3.1.16: a device that holds SDA lets go within nine; one of them is the clock of an acknowledge, and it is not given. */
   RECOVERY_CLOCKS = 9,
 };
 /* From a START to the acknowledge of address and command, at the least: hold time and eighteen
@@ -18,8 +17,7 @@ enum {
 #define COMMAND_us 44u
 #define RECOVERY_HALF_PERIOD_us 5u /* 100 kHz, for whatever is on the bus */
 
-/* Interrupts lead from one transaction to the next; a poll only checks that they move on.
- * A transaction takes 110 us. */
+/* Interrupts lead from one transaction to the next; a poll only checks that they move on. A transaction takes 110 us. */
 #define STALL_us 1000u
 #define SHUT_MIN_us 1000000u
 #define SHUT_MAX_us 16000000u
@@ -53,8 +51,7 @@ static uint32_t sensors_of(uint8_t muxes) {
   return sensors;
 }
 
-/* Switches off by RESET, which takes no transaction. Its shortest pulse, 6 ns, is less than the
- * time between two writes to the pins. */
+/* Switches off by RESET, which takes no transaction. Its shortest pulse, 6 ns, is less than the time between two writes to the pins. */
 static void shut_all_but(struct mux_bus *bus, unsigned kept) {
   for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
     if (mux != kept && bus->open[mux] != 0) {
@@ -158,9 +155,7 @@ static void account(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes
   }
   bus->just_opened = NO_MUX;
   switch (bus->under_way) {
-  case MUX_BUS_SELECT:
-    account_select(bus, acknowledged);
-    break;
+  case MUX_BUS_SELECT: account_select(bus, acknowledged); break;
   case MUX_BUS_WRITE:
     bus->command_sent = true;
     if (!acknowledged) {
@@ -169,11 +164,8 @@ static void account(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes
       bus->result.acknowledged = sensors_of(ALL_MUXES & (uint8_t)~bus->absent);
     }
     break;
-  case MUX_BUS_FETCH:
-    account_fetch(bus, acknowledged, bytes);
-    break;
-  case MUX_BUS_NOTHING:
-    break;
+  case MUX_BUS_FETCH: account_fetch(bus, acknowledged, bytes); break;
+  case MUX_BUS_NOTHING: break;
   }
 }
 
@@ -230,8 +222,7 @@ static enum ft_status look(struct mux_bus *bus, uint64_t now_us, uint64_t *wake_
   return FT_PENDING;
 }
 
-/* Twice in a row the bus stalled as soon as this multiplexer had opened: a line behind it is
- * held, and opening it loses the others too. */
+/* Twice in a row the bus stalled as soon as this multiplexer had opened: a line behind it is held, and opening it loses the others too. */
 static void judge_failure(struct mux_bus *bus, uint64_t now_us) {
   if (bus->just_opened == NO_MUX) {
     return;
@@ -296,8 +287,7 @@ static enum ft_status recover_step(struct mux_bus *bus, uint64_t now_us, uint64_
   return FT_PENDING;
 }
 
-static enum ft_status start(struct mux_bus *bus, enum mux_bus_operation operation, uint8_t command, uint8_t byte_count,
-                            uint64_t now_us) {
+static enum ft_status start(struct mux_bus *bus, enum mux_bus_operation operation, uint8_t command, uint8_t byte_count, uint64_t now_us) {
   if (bus->operation != MUX_BUS_IDLE) {
     return FT_ERR_BUSY;
   }

@@ -1,14 +1,13 @@
 /* array_bus over TCA9548A multiplexers on I2C0.
  *
- * What can go to all sensors at once does: with every used channel of every multiplexer switched on, one write reaches
- * them all, a conversion command and the command that makes ready what is read alike. Only the bytes are fetched from
- * sensor to sensor, with one channel open at a time. A channel opens at the STOP of its selection, so selections are
- * transactions of their own; a multiplexer is shut by its RESET line, which takes none. In steady state a frame takes
- * 200 us on the bus at 400 kHz for the command (3 selections, 1 write) and 2250 us for the reading (1 write, 15
- * selections, 15 fetches), and 3 us between two transactions. Sources: TCA9548A datasheet SCPS207; MS5840-02BA
- * datasheet, whose command and answer are transactions of their own; array_bus.h. All sensors sample together; the
- * reading skews nothing. Who does not acknowledge, as it did the last time, is asked once more, which repairs a
- * disturbed transaction for 110 us at most; one that is gone is asked twice once.
+ * What can go to all sensors at once does: with every used channel of every multiplexer switched on, one write reaches them all, a
+ * conversion command and the command that makes ready what is read alike. Only the bytes are fetched from sensor to sensor, with one
+ * channel open at a time. A channel opens at the STOP of its selection, so selections are transactions of their own; a multiplexer is shut
+ * by its RESET line, which takes none. In steady state a frame takes 200 us on the bus at 400 kHz for the command (3 selections, 1 write)
+ * and 2250 us for the reading (1 write, 15 selections, 15 fetches), and 3 us between two transactions. Sources: TCA9548A datasheet SCPS207;
+ * MS5840-02BA datasheet, whose command and answer are transactions of their own; array_bus.h. All sensors sample together; the reading
+ * skews nothing. Who does not acknowledge, as it did the last time, is asked once more, which repairs a disturbed transaction for 110 us at
+ * most; one that is gone is asked twice once.
  *
  * A multiplexer that still does not acknowledge is held in reset, which closes its channels whatever state it is in,
  * until the next operation asks it again; its sensors do not acknowledge and the others are not disturbed. So is one

@@ -114,24 +114,22 @@ void i2c_wave_recovery(uint16_t steps[I2C_WAVE_RECOVERY_STEPS], uint16_t stop_li
   steps[I2C_WAVE_RECOVERY_STEPS - 1] = NONE;
 }
 
-/* AND of the samples of an address where all lines are released: at its ones, and, as SCL alone is
- * sure to be, at its acknowledgement. */
+/* AND of the samples of an address where all lines are released: at its ones, and, as SCL alone is sure to be, at its acknowledgement. */
 static unsigned levels_in_address(const uint16_t *samples) {
   _Static_assert(BOARD_SENSOR_ADDRESS == 0x76, "its ones are the bits 0, 1, 2, 4 and 5 sent");
   return samples[0] & samples[1] & samples[2] & samples[4] & samples[5] & (samples[ACK] | SDA);
 }
 
 /* Exchanges a block of bits between two words. */
-#define EXCHANGE(low, high, bits, mask)                                                                                \
-  do {                                                                                                                 \
-    const uint32_t differ = ((low) >> (bits) ^ (high)) & (mask);                                                       \
-    (high) ^= differ;                                                                                                  \
-    (low) ^= differ << (bits);                                                                                         \
+#define EXCHANGE(low, high, bits, mask)                                                                                                    \
+  do {                                                                                                                                     \
+    const uint32_t differ = ((low) >> (bits) ^ (high)) & (mask);                                                                           \
+    (high) ^= differ;                                                                                                                      \
+    (low) ^= differ << (bits);                                                                                                             \
   } while (0)
 
 /* Of two rows of each matrix, the bytes of four sensors: those at first, first + 1 and eight on. */
-static inline __attribute__((always_inline)) void put_four(uint32_t rows, uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES],
-                                                           unsigned first) {
+static inline __attribute__((always_inline)) void put_four(uint32_t rows, uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES], unsigned first) {
   const uint32_t differ = (rows >> 1 ^ rows >> 16) & 0x5555u;
   rows ^= differ << 1 ^ differ << 16;
   bytes[first][0] = (uint8_t)rows;
@@ -142,9 +140,8 @@ static inline __attribute__((always_inline)) void put_four(uint32_t rows, uint8_
   }
 }
 
-/* Each sensor's byte gets the bits of its line in eight samples, the highest first: a matrix of
- * 8 x 16 bits is two of 8 x 8 side by side, transposed together by exchanging blocks of 4, 2 and 1
- * bits (Warren, Hacker's Delight, 7-3). Rows are samples, two to a word. */
+/* Each sensor's byte gets the bits of its line in eight samples, the highest first: a matrix of 8 x 16 bits is two of 8 x 8 side by side,
+ * transposed together by exchanging blocks of 4, 2 and 1 bits (Warren, Hacker's Delight, 7-3). Rows are samples, two to a word. */
 uint16_t i2c_wave_byte(const uint16_t *samples, unsigned index, uint8_t bytes[][ARRAY_BUS_MAX_READ_BYTES]) {
   samples += AT_BYTES + index * I2C_WAVE_BYTE_CELLS;
   bytes = (uint8_t(*)[ARRAY_BUS_MAX_READ_BYTES]) & bytes[0][index];

@@ -1,11 +1,9 @@
-/* Bit-parallel I2C in tables: the waves of the transactions that the array needs, and what their samples show. SCL is
- * common, so every sensor gets the same byte at the same moment and answers on its own line: a sample holds one bit of
- * each.
+/* Bit-parallel I2C in tables: the waves of the transactions that the array needs, and what their samples show. SCL is common, so every
+ * sensor gets the same byte at the same moment and answers on its own line: a sample holds one bit of each.
  *
- * Cells, steps and samples are those of rp2040/wave_player.h. A bit, a START and a STOP take a cell each, a repeated
- * START takes two, and where a build has STOP and START instead (FT_READ_STOPS) they take three. The last step of a
- * cell prepares the bit of the next one; after a STOP it leaves the bus free for 1.4 us. Pure functions. Sources:
- * UM10204; MS5840-02BA datasheet. */
+ * Cells, steps and samples are those of rp2040/wave_player.h. A bit, a START and a STOP take a cell each, a repeated START takes two, and
+ * where a build has STOP and START instead (FT_READ_STOPS) they take three. The last step of a cell prepares the bit of the next one; after
+ * a STOP it leaves the bus free for 1.4 us. Pure functions. Sources: UM10204; MS5840-02BA datasheet. */
 #pragma once
 
 #include "array_bus/array_bus.h"

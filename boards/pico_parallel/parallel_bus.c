@@ -4,14 +4,12 @@
 
 #include <string.h>
 
-/* The longest wave, and ample time for what the caller did between now_us and the start, such as
- * checking fifteen PROMs, and for the way to the event handler. No wave waits for anything, so one
- * that is not over by then will never be. */
+/* The longest wave, and ample time for what the caller did between now_us and the start, such as checking fifteen PROMs, and for the way to
+ * the event handler. No wave waits for anything, so one that is not over by then will never be. */
 #define LONGEST_us (I2C_WAVE_READ_CELLS * WAVE_CELL_ns / 1000u + 700u)
 /* From the start of a read to the samples of this byte, which come in pairs, and a little later */
 #define LOOK_us(index) (uint8_t)((I2C_WAVE_CELLS_WITH_BYTE(index) + 2u) * WAVE_CELL_ns / 1000u)
-/* From the look at the clock that a read is started with to its first step, which takes more than
- * 300 cycles of clk_sys at 125 MHz */
+/* From the look at the clock that a read is started with to its first step, which takes more than 300 cycles of clk_sys at 125 MHz */
 #define START_ns 2000u
 #define FREE_INTERVAL_MAX 1024u
 
@@ -120,8 +118,7 @@ static enum ft_status start_recovery(void *context, uint64_t now_us) {
   return FT_OK;
 }
 
-/* Takes the bytes that are complete; most of them while the last one is still on its way, so that
- * little is left to do at the end. */
+/* Takes the bytes that are complete; most of them while the last one is still on its way, so that little is left to do at the end. */
 static void take_bytes(struct parallel_bus *bus, struct array_bus_result *result) {
   const unsigned cells = wave_player_sampled();
   while (bus->bytes_taken < bus->read_count && cells >= I2C_WAVE_CELLS_WITH_BYTE(bus->bytes_taken)) {
@@ -145,8 +142,8 @@ static enum ft_status judge(struct parallel_bus *bus, struct array_bus_result *r
   if (is_read) {
     take_bytes(bus, result);
   }
-  const struct i2c_reply reply = is_read ? i2c_wave_reply(bus->samples, bus->read_count, bus->in_bytes)
-                                         : i2c_wave_reply(bus->samples, 0, UINT16_MAX);
+  const struct i2c_reply reply =
+      is_read ? i2c_wave_reply(bus->samples, bus->read_count, bus->in_bytes) : i2c_wave_reply(bus->samples, 0, UINT16_MAX);
   if (!reply.scl_follows) {
     return FT_ERR_TIMEOUT;
   }

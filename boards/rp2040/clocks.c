@@ -5,13 +5,11 @@
 #include "rp2040/resets.h"
 #include "rp2040/watchdog_regs.h"
 
-/* A poll takes about ten cycles and the ring oscillator gives at most 12 MHz: at least 80 ms. The
- * crystal needs 6 ms, a PLL 50 us. */
+/* A poll takes about ten cycles and the ring oscillator gives at most 12 MHz: at least 80 ms. The crystal needs 6 ms, a PLL 50 us. */
 enum { POLLS = 100000 };
 
-/* Some crystals swing in full after 1 ms of cycles only, and what they drive before stops the chip;
- * the SDK counts 6 ms (pico-sdk hardware/xosc.h, issue 2234; rp2040_hal issue 44). A slower one is
- * left to the watchdog, whose reset does not stop the crystal. */
+/* Some crystals swing in full after 1 ms of cycles only, and what they drive before stops the chip; the SDK counts 6 ms (pico-sdk
+ * hardware/xosc.h, issue 2234; rp2040_hal issue 44). A slower one is left to the watchdog, whose reset does not stop the crystal. */
 enum { CRYSTAL_kHz = 12000, CRYSTAL_STARTUP_ms = 6 };
 
 _Noreturn void clocks_reset_chip(void) {

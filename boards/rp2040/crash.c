@@ -107,8 +107,7 @@ _Noreturn void rp2040_take_crash(void) {
   record->vector = (uint8_t)frame->vector;
   record->activity = trace.activity;
   memcpy(&record->r0, frame, offsetof(struct fault_frame, address));
-  record->sp =
-      frame->address + (uint32_t)offsetof(struct fault_frame, address) + (frame->xpsr & XPSR_STACK_WAS_ODD ? 4 : 0);
+  record->sp = frame->address + (uint32_t)offsetof(struct fault_frame, address) + (frame->xpsr & XPSR_STACK_WAS_ODD ? 4 : 0);
   record->t_us = timer_runs() ? port_now_us() : 0;
   if (record->kind == CRASH_WATCHDOG)
     record->stuck = all_stuck((uint32_t)record->t_us);

@@ -129,9 +129,7 @@ static void begin(enum command command, uint32_t at, const uint8_t *bytes, size_
 
 void port_flash_erase(unsigned sector) { begin(COMMAND_SECTOR_ERASE, sector * PORT_FLASH_SECTOR_BYTES, NULL, 0); }
 
-void port_flash_program(uint32_t at, const uint8_t *bytes, size_t length) {
-  begin(COMMAND_PAGE_PROGRAM, at, bytes, length);
-}
+void port_flash_program(uint32_t at, const uint8_t *bytes, size_t length) { begin(COMMAND_PAGE_PROGRAM, at, bytes, length); }
 
 bool flash_may_erase(void) { return operation.phase != PHASE_IDLE && operation.head[0] == COMMAND_SECTOR_ERASE; }
 
@@ -140,8 +138,7 @@ static void send_slice(void) {
   uint8_t bytes[SLICE_BYTES];
   size_t count = 0;
   for (; count < sizeof bytes && operation.sent < operation.length; operation.sent++)
-    bytes[count++] =
-        operation.sent < HEAD_BYTES ? operation.head[operation.sent] : operation.bytes[operation.sent - HEAD_BYTES];
+    bytes[count++] = operation.sent < HEAD_BYTES ? operation.head[operation.sent] : operation.bytes[operation.sent - HEAD_BYTES];
   if (exchange(bytes, count) != FT_OK)
     operation.sent = operation.length;
 }
@@ -166,8 +163,7 @@ bool port_flash_poll(void) {
     if (!is_busy())
       operation.phase = PHASE_IDLE;
     break;
-  default:
-    break;
+  default: break;
   }
   return operation.phase != PHASE_IDLE;
 }

@@ -1,8 +1,7 @@
 /* The flash chip behind the SSI, by its own commands (W25Q16JV and its kin; RP2040 datasheet 4.10).
  *
- * Everything runs from SRAM once it is copied there, so the SSI leaves execution in place for good, and what
- * port/flash.h asks for needs no interrupt disabled and no wait: commands go out in slices that fit into the FIFOs, and
- * the chip is busy by itself. */
+ * Everything runs from SRAM once it is copied there, so the SSI leaves execution in place for good, and what port/flash.h asks for needs no
+ * interrupt disabled and no wait: commands go out in slices that fit into the FIFOs, and the chip is busy by itself. */
 #pragma once
 
 #include "common/status.h"
@@ -12,9 +11,8 @@
 
 enum { FLASH_ID_BYTES = 8 };
 
-/* To be called once, before any other function here or of port/flash.h: ends execution in place and
- * waits until the chip is not busy. A reset does not reach the chip, and it may be erasing still,
- * for 400 ms at most. FT_ERR_TIMEOUT: it does not answer. */
+/* To be called once, before any other function here or of port/flash.h: ends execution in place and waits until the chip is not busy. A
+ * reset does not reach the chip, and it may be erasing still, for 400 ms at most. FT_ERR_TIMEOUT: it does not answer. */
 enum ft_status flash_start(void);
 
 /* The unique id of the chip. Takes 4 us. FT_ERR_TIMEOUT. */

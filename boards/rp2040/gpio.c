@@ -21,8 +21,8 @@
 #define SIO_GPIO_OE_CLR 0xd0000028u
 
 void gpio_set_pad(unsigned pin, enum gpio_pull pull) {
-  REG32(PADS_BANK0_GPIO(pin)) = PAD_INPUT_ENABLE | PAD_DRIVE_4_MA | PAD_SCHMITT |
-                                (pull == GPIO_PULL_UP ? PAD_PULL_UP : 0) | (pull == GPIO_PULL_DOWN ? PAD_PULL_DOWN : 0);
+  REG32(PADS_BANK0_GPIO(pin)) = PAD_INPUT_ENABLE | PAD_DRIVE_4_MA | PAD_SCHMITT | (pull == GPIO_PULL_UP ? PAD_PULL_UP : 0) |
+                                (pull == GPIO_PULL_DOWN ? PAD_PULL_DOWN : 0);
 }
 
 void gpio_set_function(unsigned pin, enum gpio_function function) { REG32(IO_BANK0_CTRL(pin)) = (uint32_t)function; }

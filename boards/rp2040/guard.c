@@ -26,8 +26,7 @@ static void guard_code(void) {
   for (uint32_t log2 = 18; log2 >= 9; log2 -= 3) {
     uint32_t eighths = (end - at) >> (log2 - 3);
     MPU_RBAR = at | MPU_RBAR_REGION(region);
-    MPU_RASR =
-        MPU_RASR_READ_ONLY | MPU_RASR_NORMAL | MPU_RASR_EIGHTHS(eighths) | MPU_RASR_BYTES(log2) | MPU_RASR_ENABLE;
+    MPU_RASR = MPU_RASR_READ_ONLY | MPU_RASR_NORMAL | MPU_RASR_EIGHTHS(eighths) | MPU_RASR_BYTES(log2) | MPU_RASR_ENABLE;
     at += eighths << (log2 - 3);
     region++;
   }

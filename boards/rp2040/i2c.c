@@ -7,10 +7,9 @@
 
 /* Timing in cycles of ic_clk = clk_sys = 125 MHz, 8 ns (datasheet 4.3.14):
  *   SCL low = LCNT + 1,  SCL high = HCNT + SPKLEN + 7,  tHD;STA = HCNT + 3.
- * Fast mode asks for tLOW >= 1.3 us, tHIGH >= 0.6 us, tHD;STA >= 0.6 us and spikes of 50 ns to be
- * ignored. The low time is counted from the moment the controller begins to pull, so the longest
- * fall time allowed, 0.3 us, is added to it. 1600 ns + 904 ns = 2504 ns: 399.4 kHz, less the rise
- * time of the bus. The SDA hold bridges the same fall time of SCL. */
+ * Fast mode asks for tLOW >= 1.3 us, tHIGH >= 0.6 us, tHD;STA >= 0.6 us and spikes of 50 ns to be ignored. The low time is counted from the
+ * moment the controller begins to pull, so the longest fall time allowed, 0.3 us, is added to it. 1600 ns + 904 ns = 2504 ns: 399.4 kHz,
+ * less the rise time of the bus. The SDA hold bridges the same fall time of SCL. */
 #define CYCLES(ns) (((ns) + 7u) / 8u)
 enum {
   SPIKE_CYCLES = CYCLES(50),
@@ -145,9 +144,7 @@ enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]) {
   return end(FT_OK);
 }
 
-static uint8_t pin_of(const struct i2c_pins *pins, enum i2c_line line) {
-  return line == I2C_LINE_SDA ? pins->sda : pins->scl;
-}
+static uint8_t pin_of(const struct i2c_pins *pins, enum i2c_line line) { return line == I2C_LINE_SDA ? pins->sda : pins->scl; }
 
 void i2c_line_pull_low(const struct i2c_pins *pins, enum i2c_line line) { gpio_drive(pin_of(pins, line), true); }
 

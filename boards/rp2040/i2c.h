@@ -1,5 +1,4 @@
-/* I2C0 as the bus master of single short transactions at 400 kHz, and its two lines as plain pins for the recovery of a
- * stuck bus.
+/* I2C0 as the bus master of single short transactions at 400 kHz, and its two lines as plain pins for the recovery of a stuck bus.
  *
  * A transaction fits into the FIFO whole, so it is loaded at once and needs no code until its STOP, whose interrupt
  * calls the owner, who may start the next one from there. Nothing here waits, but for a block to leave reset (a few
@@ -33,8 +32,7 @@ enum ft_status i2c_open(const struct i2c_pins *pins, struct i2c_owner owner);
  * and turns them into open-drain pins, not pulled low. */
 void i2c_close_to_lines(const struct i2c_pins *pins);
 
-/* START, address, one byte, STOP. Any earlier transaction must have ended. Answers like i2c_poll():
- * FT_PENDING or FT_ERR_BUSY. */
+/* START, address, one byte, STOP. Any earlier transaction must have ended. Answers like i2c_poll(): FT_PENDING or FT_ERR_BUSY. */
 enum ft_status i2c_start_write(uint8_t address, uint8_t byte);
 
 /* START, address, byte_count (1..I2C_MAX_READ_BYTES) bytes read, STOP. */

@@ -33,7 +33,7 @@
 #define PIO_IN_PINS(count, delay) (0x4000u | (uint32_t)(delay) << 8 | (uint32_t)(count))
 #define PIO_MOV_PINS_NULL 0xa003u
 #define PIO_JMP(address) (0x0000u | (uint32_t)(address))
-#define PIO_JMP_X_DECREMENTED(address, delay)                                                                          \
+#define PIO_JMP_X_DECREMENTED(address, delay)                                                                                              \
   (0x0040u | (uint32_t)(delay) << 8 | (uint32_t)(address)) /* unless X is 0; then X is one less */
 #define PIO_JMP_Y_DECREMENTED(address) (0x0080u | (uint32_t)(address))
 #define PIO_JMP_PIN(address) (0x00c0u | (uint32_t)(address))

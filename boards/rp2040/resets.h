@@ -1,5 +1,4 @@
-/* Subsystem resets (RP2040 datasheet 2.14). A block is unusable, and its registers must not be touched, until it has
- * been released. */
+/* Subsystem resets (RP2040 datasheet 2.14). A block is unusable, and its registers must not be touched, until it has been released. */
 #pragma once
 
 #include "common/status.h"

@@ -19,12 +19,11 @@ static void wait_for(uint32_t address, uint32_t bits) {
 #define SCB_SCR 0xe000ed10u
 #define SCB_SCR_SLEEPDEEP (1u << 2)
 
-/* clk_usb and its PLL stay: the controller needs them to see the bus wake up, and may hang when the
- * PLL is started again below it (pico-sdk issue 1746). Else as MicroPython's machine.lightsleep():
- * the crystal drives clk_sys, and asleep nothing has a clock but what can end the sleep. The other
- * core sleeps deeply too, in the boot ROM or in second_core.c. It is written nowhere what the controller does with
- * traffic while clk_sys is slower than its own 48 MHz. There is none: a host signals a resume for
- * 20 ms and a reset for 10 (USB 2.0, 7.1.7), and clk_sys is fast again within 1. */
+/* clk_usb and its PLL stay: the controller needs them to see the bus wake up, and may hang when the PLL is started again below it (pico-sdk
+ * issue 1746). Else as MicroPython's machine.lightsleep(): the crystal drives clk_sys, and asleep nothing has a clock but what can end the
+ * sleep. The other core sleeps deeply too, in the boot ROM or in second_core.c. It is written nowhere what the controller does with traffic
+ * while clk_sys is slower than its own 48 MHz. There is none: a host signals a resume for 20 ms and a reset for 10 (USB 2.0, 7.1.7), and
+ * clk_sys is fast again within 1. */
 static void begin_saving(void) {
   REG32_CLEAR(CLK_SYS_CTRL) = CLK_SYS_SRC_AUX;
   wait_for(CLK_SYS_SELECTED, 1u << CLK_SYS_SRC_REF);

@@ -1,5 +1,4 @@
-/* What both processors see of each other (RP2040 datasheet 2.3.1), and the reset of the second one
- * (2.13 power-on state machine). */
+/* What both processors see of each other (RP2040 datasheet 2.3.1), and the reset of the second one (2.13 power-on state machine). */
 #pragma once
 
 #include "rp2040/reg.h"

@@ -1,21 +1,17 @@
-/* The controller keeps no toggles and no state of its own worth speaking of: each packet's PID is in its buffer control
- * word, and software reads from BUFF_STATUS what has happened (RP2040 datasheet 4.1.2). Every endpoint is
- * single-buffered.
+/* The controller keeps no toggles and no state of its own worth speaking of: each packet's PID is in its buffer control word, and software
+ * reads from BUFF_STATUS what has happened (RP2040 datasheet 4.1.2). Every endpoint is single-buffered.
  *
- * Errata: E2 (an abort blocks the controller for good) and E5 (a busy bus hides the end of a bus reset) are fixed in
- * revision B2 of the chip. On B0 and B1 aborts are left out, and against E5 the bus is made to look idle after a reset,
- * if the board can spare GPIO15 for it: else the device may not enumerate there behind a hub with traffic (pico-sdk,
- * rp2040_usb_device_enumeration.c). E15 (some bus errors in an IN transfer hang the device) is in all revisions: no
- * bulk IN packet is offered in the last 200 us of a frame, where such errors come from. It can still strike (TinyUSB
- * pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even a bus reset. So the
- * block is reset, and the device attached again, when the bus is silent and not suspended, or when frames but no
- * request follow a reset of the bus. A hung controller that goes on seeing frames, under a host that resets nothing, is
- * not noticed.
+ * Errata: E2 (an abort blocks the controller for good) and E5 (a busy bus hides the end of a bus reset) are fixed in revision B2 of the
+ * chip. On B0 and B1 aborts are left out, and against E5 the bus is made to look idle after a reset, if the board can spare GPIO15 for it:
+ * else the device may not enumerate there behind a hub with traffic (pico-sdk, rp2040_usb_device_enumeration.c). E15 (some bus errors in an
+ * IN transfer hang the device) is in all revisions: no bulk IN packet is offered in the last 200 us of a frame, where such errors come
+ * from. It can still strike (TinyUSB pull request 1779, embassy issue 2880), and then nothing but a reset of the block helps, not even a
+ * bus reset. So the block is reset, and the device attached again, when the bus is silent and not suspended, or when frames but no request
+ * follow a reset of the bus. A hung controller that goes on seeing frames, under a host that resets nothing, is not noticed.
  *
- * The number of resets before the request shows nothing. An EHCI controller sends no frame after its own reset of a
- * full-speed device; its companion then resets the device again (Linux, ehci-hub.c check_reset_complete()). And the
- * erratum strikes a controller that answers, so one that has not yet heard a request since its block was reset waits
- * for as long as the host takes. */
+ * The number of resets before the request shows nothing. An EHCI controller sends no frame after its own reset of a full-speed device; its
+ * companion then resets the device again (Linux, ehci-hub.c check_reset_complete()). And the erratum strikes a controller that answers, so
+ * one that has not yet heard a request since its block was reset waits for as long as the host takes. */
 #include "rp2040/usb_controller.h"
 
 #include "port/port.h"
@@ -77,8 +73,7 @@ static enum { WATCH, ATTACH, AWAIT_END_OF_RESET, FEIGN_IDLE } next;
 static uint32_t feigned_ms;
 static uint32_t alive_us; /* when last the bus was not silent, or was asleep */
 static uint32_t patience = 1;
-/* What is awaited of the host: a first request to a block just reset, nothing, a frame or a request
- * after a reset of the bus. */
+/* What is awaited of the host: a first request to a block just reset, nothing, a frame or a request after a reset of the bus. */
 static enum { AWAIT_SETUP_AFTER_ATTACH, AWAIT_NOTHING, AWAIT_FRAME, AWAIT_SETUP } awaited;
 static uint32_t asking_us; /* the first frame after the reset: AWAIT_SETUP */
 
@@ -177,8 +172,8 @@ void usb_controller_open(uint8_t endpoint, enum usb_endpoint_type type) {
   if (type == USB_ENDPOINT_BULK)
     bulk |= USB_BIT(endpoint);
   USB_BUFFER_CONTROL(endpoint) = 0;
-  USB_ENDPOINT_CONTROL(endpoint) = USB_ENDPOINT_CONTROL_ENABLE | USB_ENDPOINT_CONTROL_INTERRUPT |
-                                   USB_ENDPOINT_CONTROL_TYPE(type) | USB_BUFFER_OFFSET(endpoint);
+  USB_ENDPOINT_CONTROL(endpoint) =
+      USB_ENDPOINT_CONTROL_ENABLE | USB_ENDPOINT_CONTROL_INTERRUPT | USB_ENDPOINT_CONTROL_TYPE(type) | USB_BUFFER_OFFSET(endpoint);
 }
 
 static void close(uint8_t endpoint) {
@@ -316,9 +311,7 @@ void timer1_irq_handler(void) {
     else
       watch();
     break;
-  case ATTACH:
-    attach();
-    break;
+  case ATTACH: attach(); break;
   case AWAIT_END_OF_RESET:
     if (REG32(USB_SIE_STATUS) & USB_SIE_STATUS_LINES) {
       feign_idle();
@@ -444,8 +437,7 @@ void usb_service_irq_handler(void) {
   usb_device_on_service();
 }
 
-/* What cannot wait, and nothing else: it interrupts the handling of the rest too. A token that
- * follows a SETUP comes 3 us later. */
+/* What cannot wait, and nothing else: it interrupts the handling of the rest too. A token that follows a SETUP comes 3 us later. */
 void usbctrl_irq_handler(void) {
   uint32_t interrupts = USB_INTS;
   if (interrupts & USB_INT_SETUP_REQ)

@@ -15,8 +15,7 @@
 #define USB_DPRAM_BYTES 4096u
 #define USB_SETUP_PACKET USB_DPRAM_BASE
 
-#define USB_ENDPOINT_CONTROL(endpoint)                                                                                 \
-  REG32(USB_DPRAM_BASE + 8u * USB_NUMBER(endpoint) + 4u * USB_OUT(endpoint)) /* not endpoint 0 */
+#define USB_ENDPOINT_CONTROL(endpoint) REG32(USB_DPRAM_BASE + 8u * USB_NUMBER(endpoint) + 4u * USB_OUT(endpoint)) /* not endpoint 0 */
 #define USB_ENDPOINT_CONTROL_ENABLE (1u << 31)
 #define USB_ENDPOINT_CONTROL_INTERRUPT (1u << 29) /* for each buffer */
 #define USB_ENDPOINT_CONTROL_TYPE(type) ((uint32_t)(type) << 26)
@@ -29,7 +28,7 @@
 #define USB_BUFFER_LENGTH 0x3ffu
 
 /* Offsets of the packet buffers; endpoint 0 has one for both directions, at a fixed place. */
-#define USB_BUFFER_OFFSET(endpoint)                                                                                    \
+#define USB_BUFFER_OFFSET(endpoint)                                                                                                        \
   (USB_NUMBER(endpoint) == 0 ? 0x100u : 0x180u + 64u * (2u * (USB_NUMBER(endpoint) - 1u) + USB_OUT(endpoint)))
 
 /* Registers */

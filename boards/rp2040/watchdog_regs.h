@@ -1,5 +1,4 @@
-/* Watchdog with the tick generator, and what its reset reaches (RP2040 datasheet 4.7 watchdog, 2.13
- * power-on state machine). */
+/* Watchdog with the tick generator, and what its reset reaches (RP2040 datasheet 4.7 watchdog, 2.13 power-on state machine). */
 #pragma once
 
 #include "rp2040/reg.h"

@@ -47,8 +47,7 @@ enum ft_status wave_player_open(void) {
   PIO_SM0_EXECCTRL(PIO0_BASE) = PIO_EXECCTRL_WRAP(0, PROGRAM_LENGTH - 1);
   PIO_SM0_PINCTRL(PIO0_BASE) = PIO_PINCTRL_OUT(0, LINES) | PIO_PINCTRL_IN(0);
   PIO_SM0_INSTR(PIO0_BASE) = PIO_MOV_PINS_NULL; /* a driven line is low; after the reset none is driven */
-  PIO_SM0_SHIFTCTRL(PIO0_BASE) =
-      PIO_SHIFTCTRL_OUT_RIGHT | PIO_SHIFTCTRL_IN_RIGHT | PIO_SHIFTCTRL_AUTOPULL | PIO_SHIFTCTRL_AUTOPUSH;
+  PIO_SM0_SHIFTCTRL(PIO0_BASE) = PIO_SHIFTCTRL_OUT_RIGHT | PIO_SHIFTCTRL_IN_RIGHT | PIO_SHIFTCTRL_AUTOPULL | PIO_SHIFTCTRL_AUTOPUSH;
   for (unsigned pin = 0; pin < LINES; pin++) {
     gpio_set_pad(pin, GPIO_PULL_UP);
     gpio_set_function(pin, GPIO_FUNCTION_PIO0);
@@ -60,16 +59,15 @@ enum ft_status wave_player_open(void) {
   return FT_OK;
 }
 
-/* A word holds two steps or two samples, the first in its low half, which leaves the shift register
- * first and enters it first. */
+/* A word holds two steps or two samples, the first in its low half, which leaves the shift register first and enters it first. */
 /* NOLINTNEXTLINE(readability-non-const-parameter): DMA writes the samples */
 void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_count) {
   cells = cell_count;
   DMA_READ_ADDR(CHANNEL_SAMPLES) = PIO_RXF0_ADDRESS(PIO0_BASE);
   DMA_WRITE_ADDR(CHANNEL_SAMPLES) = (uint32_t)(uintptr_t)samples;
   DMA_TRANS_COUNT(CHANNEL_SAMPLES) = cell_count / 2;
-  DMA_CTRL_TRIG(CHANNEL_SAMPLES) = DMA_CTRL_EN | DMA_CTRL_WORDS | DMA_CTRL_INCR_WRITE |
-                                   DMA_CTRL_CHAIN_TO(CHANNEL_SAMPLES) | DMA_CTRL_TREQ(DMA_DREQ_PIO0_RX0);
+  DMA_CTRL_TRIG(CHANNEL_SAMPLES) =
+      DMA_CTRL_EN | DMA_CTRL_WORDS | DMA_CTRL_INCR_WRITE | DMA_CTRL_CHAIN_TO(CHANNEL_SAMPLES) | DMA_CTRL_TREQ(DMA_DREQ_PIO0_RX0);
   DMA_READ_ADDR(CHANNEL_STEPS) = (uint32_t)(uintptr_t)steps;
   DMA_WRITE_ADDR(CHANNEL_STEPS) = PIO_TXF0_ADDRESS(PIO0_BASE);
   DMA_TRANS_COUNT(CHANNEL_STEPS) = WAVE_STEPS_PER_CELL * cell_count / 2;

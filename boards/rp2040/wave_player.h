@@ -4,14 +4,12 @@
  * A step is a bitmap of the lines pulled low; the others are released. Four steps make a cell. In each cell all lines
  * are sampled once, at the end of its first step. When a wave is over, the lines stay as its last step has them.
  *
- * The lengths of the steps are those that a bit of fast-mode I2C needs: SCL is high in the first two and low in the
- * others, and SDA may change between those. They keep the times of UM10204 table 10 where a line is back above 0.7 VDD
- * within 430 ns, which is a rise time of 300 ns from 0.3 VDD on, and below 0.3 VDD within 180 ns: tLOW >= 1.3 us,
- * tHIGH, tSU;STA, tSU;STO, tHD;STA >= 0.6 us, SDA held 300 ns beyond the fall of SCL. 2520 ns a bit: 396.8 kHz whatever
- * the rise time, as nothing waits for an edge.
+ * The lengths of the steps are those that a bit of fast-mode I2C needs: SCL is high in the first two and low in the others, and SDA may
+ * change between those. They keep the times of UM10204 table 10 where a line is back above 0.7 VDD within 430 ns, which is a rise time of
+ * 300 ns from 0.3 VDD on, and below 0.3 VDD within 180 ns: tLOW >= 1.3 us, tHIGH, tSU;STA, tSU;STO, tHD;STA >= 0.6 us, SDA held 300 ns
+ * beyond the fall of SCL. 2520 ns a bit: 396.8 kHz whatever the rise time, as nothing waits for an edge.
  *
- * One context: the event handler, or main before there is one. Nothing here waits, but for blocks
- * to leave reset, which is bounded. */
+ * One context: the event handler, or main before there is one. Nothing here waits, but for blocks to leave reset, which is bounded. */
 #pragma once
 
 #include "common/status.h"

@@ -9,8 +9,7 @@
 
 #include <string.h>
 
-/* Longest delay of the once-a-second work, us: it waits until a frame has just been sent, so that it never delays one.
- */
+/* Longest delay of the once-a-second work, us: it waits until a frame has just been sent, so that it never delays one. */
 #define FRAME_WAIT_us 100000u
 /* Pause after which the zeros are taken again, us: a zero that is not followed may be off by 30 Pa then (ZERO.md). */
 #define ZERO_LASTS_us 60000000u
@@ -18,8 +17,7 @@
 #define SHARED_PITCH_mm 9.0f
 /* Longest time between two rounds of the main loop, us: a fifth of the watchdog's period. */
 #define TICK_us (PORT_WATCHDOG_PERIOD_us / 5u)
-/* The same while something is being stored, which takes some fifty rounds and an erase, and while edges of the sync pin
- * come. */
+/* The same while something is being stored, which takes some fifty rounds and an erase, and while edges of the sync pin come. */
 #define FAST_TICK_us 1000u
 
 void app_on_event(struct app *app) {
@@ -187,8 +185,7 @@ static void each_second(struct app *app, uint64_t now_us, bool after_frame) {
 void app_run(struct app *app) {
   const uint32_t news = cdc_news();
   const bool tick = atomic_load_explicit(&app->tick.is_due, memory_order_relaxed) != 0;
-  if (!app->active && !tick && news == app->news && !scan_has_news(&app->scan) &&
-      may_save_power(app) == app->saves_power) {
+  if (!app->active && !tick && news == app->news && !scan_has_news(&app->scan) && may_save_power(app) == app->saves_power) {
     port_sleep();
     return;
   }

@@ -80,47 +80,34 @@ static enum ft_status set_streams(struct commands *commands, uint8_t streams) {
   return FT_OK;
 }
 
-void commands_plan_loader(struct commands *commands, uint64_t now_us) {
-  commands->loader_at_us = now_us + LOADER_DELAY_us;
-}
+void commands_plan_loader(struct commands *commands, uint64_t now_us) { commands->loader_at_us = now_us + LOADER_DELAY_us; }
 
 static enum ft_status obey(struct app *app, const struct wire_packet *command, uint64_t now_us) {
   switch (command->type) {
-  case WIRE_CMD_STREAM:
-    return set_streams(&app->commands, command->body.cmd_stream.streams);
-  case WIRE_CMD_TARE:
-    return tare(app, command->body.cmd_tare.force);
-  case WIRE_CMD_RATE:
-    return set_rate(app, command->body.cmd_rate.rate_mHz);
-  case WIRE_CMD_OSR:
-    return set_osr(app, command->body.cmd_osr.osr);
-  case WIRE_CMD_KEEP:
-    return keep_settings(app, command->body.cmd_keep.keep);
+  case WIRE_CMD_STREAM: return set_streams(&app->commands, command->body.cmd_stream.streams);
+  case WIRE_CMD_TARE: return tare(app, command->body.cmd_tare.force);
+  case WIRE_CMD_RATE: return set_rate(app, command->body.cmd_rate.rate_mHz);
+  case WIRE_CMD_OSR: return set_osr(app, command->body.cmd_osr.osr);
+  case WIRE_CMD_KEEP: return keep_settings(app, command->body.cmd_keep.keep);
   case WIRE_CMD_INFO:
   case WIRE_CMD_HEALTH:
-  case WIRE_CMD_CRASH:
-    return FT_OK;
+  case WIRE_CMD_CRASH: return FT_OK;
   case WIRE_CMD_LOADER:
     if (command->body.cmd_loader.magic != WIRE_LOADER_MAGIC) {
       return FT_ERR_ARGUMENT;
     }
     commands_plan_loader(&app->commands, now_us);
     return FT_OK;
-  default:
-    return stages_obey(&app->stages, command, &app->store);
+  default: return stages_obey(&app->stages, command, &app->store);
   }
 }
 
 static enum wire_result result_of(enum ft_status status) {
   switch (status) {
-  case FT_OK:
-    return WIRE_RESULT_DONE;
-  case FT_ERR_ARGUMENT:
-    return WIRE_RESULT_OUT_OF_RANGE;
-  case FT_ERR_TYPE:
-    return WIRE_RESULT_UNKNOWN_COMMAND;
-  default:
-    return WIRE_RESULT_NOT_NOW;
+  case FT_OK: return WIRE_RESULT_DONE;
+  case FT_ERR_ARGUMENT: return WIRE_RESULT_OUT_OF_RANGE;
+  case FT_ERR_TYPE: return WIRE_RESULT_UNKNOWN_COMMAND;
+  default: return WIRE_RESULT_NOT_NOW;
   }
 }
 
@@ -134,8 +121,7 @@ static void acknowledge(struct app *app, const struct wire_ack *ack, uint64_t no
   }
 }
 
-/* app->line.packet holds the command and is used up. Not part of commands_receive, whose stack lies below that of the
- * decoder. */
+/* app->line.packet holds the command and is used up. Not part of commands_receive, whose stack lies below that of the decoder. */
 static __attribute__((noinline)) void answer_command(struct app *app, uint64_t now_us) {
   const struct wire_packet *command = &app->line.packet;
   struct wire_ack ack = {.command = command->type, .sequence = command->sequence, .host_time_us = command->t_us};

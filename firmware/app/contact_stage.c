@@ -2,9 +2,7 @@
 
 #include "common/contact_flags.h"
 
-static bool is_sensor_doubtful(const struct findings *found) {
-  return (found->frame.doubtful & found->conditioned.usable) != 0;
-}
+static bool is_sensor_doubtful(const struct findings *found) { return (found->frame.doubtful & found->conditioned.usable) != 0; }
 
 void contact_stage_gather(struct findings *found, bool calibrated) {
   const struct frame *frame = &found->frame;

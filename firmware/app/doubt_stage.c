@@ -17,8 +17,7 @@ void doubt_stage_process(const struct doubt_stage *own, const struct location_st
 }
 
 static void learn_gains(struct doubt_stage *own, struct location_stage *location, const struct findings *found) {
-  if (fit_gains_learn(&own->gains, &location->array, found->conditioned.pressure_Pa_q10, &location->settings,
-                      &found->fit)) {
+  if (fit_gains_learn(&own->gains, &location->array, found->conditioned.pressure_Pa_q10, &location->settings, &found->fit)) {
     const float gain_sd = fit_gains_sd(&own->gains);
     for (unsigned k = 0; k < geometry.sensor_count; k++) {
       location->settings.gain_sd_q16[k] = (uint16_t)(65536.0f * gain_sd + 0.5f);

@@ -1,7 +1,6 @@
 /* Stage: the error of the location by a tangential force that is not estimated (fit/fit_doubt.h), and the gains of a
  * pad that was never calibrated (fit/fit_gains.h). Reads findings.frame, .conditioned and .tangential. Widens
- * findings.fit.location_sd_mm, adds a flag, and sets the gains' standard deviation in the settings of location_stage.
- */
+ * findings.fit.location_sd_mm, adds a flag, and sets the gains' standard deviation in the settings of location_stage. */
 #pragma once
 
 #include "app/findings.h"

@@ -16,20 +16,19 @@
 #include <stdint.h>
 
 struct findings {
-  /* What the main loop has been at in this frame (enum crash_activity), since when, and for how long; times modulo 2^32
-   */
+  /* What the main loop has been at in this frame (enum crash_activity), since when, and for how long; times modulo 2^32 */
   uint8_t activity;
   uint32_t taken_us, since_us;
   uint32_t spent_us[CRASH_AT_PACKET];
   uint64_t slept_us; /* in this frame, while the other processor worked */
 
-  struct contact_result contact;           /* contact_stage: flags and slip; all later stages add flags */
-  struct contact_input contact_input;      /* contact_stage, but for .tangential */
-  struct frame frame;                      /* from the scan */
-  struct conditioned conditioned;          /* condition_stage: pressures above the zero, and whether anything touches */
-  struct fit_result fit;                   /* location_stage; doubt_stage widens its standard deviation */
-  struct contact_force force;              /* location_stage: the force of the fit, scaled */
-  const struct fit_tangential *tangential; /* tangential_stage: the estimate; NULL: there is none */
+  struct contact_result contact;            /* contact_stage: flags and slip; all later stages add flags */
+  struct contact_input contact_input;       /* contact_stage, but for .tangential */
+  struct frame frame;                       /* from the scan */
+  struct conditioned conditioned;           /* condition_stage: pressures above the zero, and whether anything touches */
+  struct fit_result fit;                    /* location_stage; doubt_stage widens its standard deviation */
+  struct contact_force force;               /* location_stage: the force of the fit, scaled */
+  const struct fit_tangential *tangential;  /* tangential_stage: the estimate; NULL: there is none */
   struct tangential_force tangential_force; /* tangential_stage: the estimate in the scales of the pad */
   struct motion motion;                     /* motion_update */
   struct shapes_place location;             /* shapes_stage: the location to report */

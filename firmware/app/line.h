@@ -14,6 +14,5 @@ struct line {
   struct wire_receiver receiver;
 };
 
-/* Sends .packet.body, or drops it where the queue is full: a sequence number is used all the same, so that the host
- * sees the gap. */
+/* Sends .packet.body, or drops it where the queue is full: a sequence number is used all the same, so that the host sees the gap. */
 void line_send(struct line *line, const struct wire_layout *layout, uint64_t t_us);

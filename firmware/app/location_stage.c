@@ -23,12 +23,10 @@
 #define FIT fit_gaussian_grid_follow
 #elif FT_WITH_FULL_GRID
 #define INIT_ARRAY fit_array_init_grid
-#define FIT(array, pressure, usable, settings, watch, result)                                                          \
-  fit_gaussian_grid_plain(array, pressure, usable, settings, result)
+#define FIT(array, pressure, usable, settings, watch, result) fit_gaussian_grid_plain(array, pressure, usable, settings, result)
 #else
 #define INIT_ARRAY fit_array_init_grid
-#define FIT(array, pressure, usable, settings, watch, result)                                                          \
-  fit_gaussian_grid_small(array, pressure, usable, settings, result)
+#define FIT(array, pressure, usable, settings, watch, result) fit_gaussian_grid_small(array, pressure, usable, settings, result)
 #endif
 
 void location_stage_start(struct location_stage *own) {
@@ -51,8 +49,7 @@ void location_stage_process(struct location_stage *own, const int32_t *past_sd_P
   if (found->conditioned.contact) {
     own->settings.noise_Pa_q10 = found->frame.noise_Pa_q10;
     memcpy(own->settings.past_sd_Pa_q10, past_sd_Pa_q10, sizeof own->settings.past_sd_Pa_q10);
-    FIT(&own->array, found->conditioned.pressure_Pa_q10, found->conditioned.usable, &own->settings, &own->watch,
-        &found->fit);
+    FIT(&own->array, found->conditioned.pressure_Pa_q10, found->conditioned.usable, &own->settings, &own->watch, &found->fit);
     own->failures += !(found->fit.flags & CONTACT_FLAG_FIT_VALID);
   } else {
     memset(&found->fit, 0, sizeof found->fit);
@@ -96,8 +93,8 @@ static void set_shape(struct location_stage *own) {
 
 enum ft_status location_stage_set_prior(struct location_stage *own, float sigma_mm, float sd_mm) {
   const bool none = sigma_mm == 0.0f && sd_mm == 0.0f;
-  const bool possible = sigma_mm >= WIRE_PRIOR_SIGMA_MIN_mm && sigma_mm <= WIRE_PRIOR_SIGMA_MAX_mm &&
-                        sd_mm >= WIRE_PRIOR_WIDTH_MIN_mm && sd_mm <= WIRE_PRIOR_WIDTH_MAX_mm;
+  const bool possible = sigma_mm >= WIRE_PRIOR_SIGMA_MIN_mm && sigma_mm <= WIRE_PRIOR_SIGMA_MAX_mm && sd_mm >= WIRE_PRIOR_WIDTH_MIN_mm &&
+                        sd_mm <= WIRE_PRIOR_WIDTH_MAX_mm;
   if (!none && !possible) {
     return FT_ERR_ARGUMENT;
   }

@@ -24,8 +24,8 @@ static void set_question(struct shapes_question *question, bool begins, const st
   question->force_scale_sd = scales->force_scale_sd;
 }
 
-void shapes_stage_ask(struct shapes_stage *own, const struct location_stage *location,
-                      const struct tangential_settings *scales, struct jobs *jobs, const struct findings *found) {
+void shapes_stage_ask(struct shapes_stage *own, const struct location_stage *location, const struct tangential_settings *scales,
+                      struct jobs *jobs, const struct findings *found) {
   const bool asks = own->is_in_use && found->conditioned.contact;
   if (!asks || own->starts != jobs->starts) {
     own->begins = true;
@@ -59,8 +59,7 @@ void shapes_stage_judge_tangential(const struct shapes_stage *own, struct findin
   }
 }
 
-void shapes_stage_locate(const struct shapes_stage *own, const struct location_stage *location,
-                         struct findings *found) {
+void shapes_stage_locate(const struct shapes_stage *own, const struct location_stage *location, struct findings *found) {
   const bool has_force = (found->contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
   found->contact.flags |= shapes_flags(&own->report);
   found->location = shapes_locate(&own->report, &found->fit, has_force ? &found->tangential_force : NULL);

@@ -22,10 +22,9 @@ struct shapes_stage {
 /* array outlives the stage. */
 void shapes_stage_start(struct shapes_stage *own, const struct fit_array *array, struct jobs *jobs);
 
-/* After the tangential question: takes what is known of the shape, and asks for more. scales: the tangential stage's.
- */
-void shapes_stage_ask(struct shapes_stage *own, const struct location_stage *location,
-                      const struct tangential_settings *scales, struct jobs *jobs, const struct findings *found);
+/* After the tangential question: takes what is known of the shape, and asks for more. scales: the tangential stage's. */
+void shapes_stage_ask(struct shapes_stage *own, const struct location_stage *location, const struct tangential_settings *scales,
+                      struct jobs *jobs, const struct findings *found);
 
 /* After the tangential answer: two contacts have no tangential force in common. */
 void shapes_stage_judge_tangential(const struct shapes_stage *own, struct findings *found);

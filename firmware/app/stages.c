@@ -167,8 +167,7 @@ void stages_follow(struct stages *stages, const struct findings *found, struct s
 
 void stages_each_second(struct stages *stages, const struct findings *found) {
 #if FT_WITH_FIT
-  location_stage_scale_force(&stages->location, &stages->condition.condition, found->conditioned.tared,
-                             &stages->contact_settings);
+  location_stage_scale_force(&stages->location, &stages->condition.condition, found->conditioned.tared, &stages->contact_settings);
 #endif
 #if FT_WITH_TANGENTIAL
   tangential_stage_use_scale(&stages->tangential, &stages->location, &stages->contact_settings);
@@ -212,8 +211,7 @@ static void forget_jobs(struct stages *stages) {
 #endif
 }
 
-void stages_use_calibration(struct stages *stages, const struct findings *found,
-                            const struct calibration *calibration) {
+void stages_use_calibration(struct stages *stages, const struct findings *found, const struct calibration *calibration) {
   forget_jobs(stages);
 #if FT_WITH_FIT
   condition_stage_use_calibration(&stages->condition, calibration);
@@ -245,8 +243,8 @@ void stages_use_stored_pad(struct stages *stages, const struct findings *found, 
 
 #if FT_WITH_SLIP
 static enum ft_status set_slip(struct stages *stages, float threshold_mm, uint16_t window_ms) {
-  if (!(threshold_mm >= WIRE_SLIP_THRESHOLD_MIN_mm && threshold_mm <= WIRE_SLIP_THRESHOLD_MAX_mm) ||
-      window_ms < WIRE_SLIP_WINDOW_MIN_ms || window_ms > WIRE_SLIP_WINDOW_MAX_ms) {
+  if (!(threshold_mm >= WIRE_SLIP_THRESHOLD_MIN_mm && threshold_mm <= WIRE_SLIP_THRESHOLD_MAX_mm) || window_ms < WIRE_SLIP_WINDOW_MIN_ms ||
+      window_ms > WIRE_SLIP_WINDOW_MAX_ms) {
     return FT_ERR_ARGUMENT;
   }
   stages->contact_settings.slip_threshold_mm = threshold_mm;
@@ -301,8 +299,7 @@ const struct wire_layout *const stages_commands[] = {WIRE_COMMANDS,
 
 #if FT_WITH_FIT
 static enum ft_status store_calibration(struct store *store, const struct wire_cmd_calibrate *command) {
-  if (command->sensor_count != geometry.sensor_count ||
-      !calibration_is_valid(&command->calibration, geometry.sensor_count)) {
+  if (command->sensor_count != geometry.sensor_count || !calibration_is_valid(&command->calibration, geometry.sensor_count)) {
     return FT_ERR_ARGUMENT;
   }
   return store_put_calibration(store, &command->calibration);
@@ -318,32 +315,23 @@ static enum ft_status store_profile(struct store *store, const struct pad_profil
 enum ft_status stages_obey(struct stages *stages, const struct wire_packet *command, struct store *store) {
   switch (command->type) {
 #if FT_WITH_SLIP
-  case WIRE_CMD_SLIP:
-    return set_slip(stages, command->body.cmd_slip.threshold_mm, command->body.cmd_slip.window_ms);
+  case WIRE_CMD_SLIP: return set_slip(stages, command->body.cmd_slip.threshold_mm, command->body.cmd_slip.window_ms);
 #endif
 #if FT_WITH_FIT
-  case WIRE_CMD_CALIBRATE:
-    return store_calibration(store, &command->body.cmd_calibrate);
-  case WIRE_CMD_ERASE_CALIBRATION:
-    return store_put_calibration(store, NULL);
+  case WIRE_CMD_CALIBRATE: return store_calibration(store, &command->body.cmd_calibrate);
+  case WIRE_CMD_ERASE_CALIBRATION: return store_put_calibration(store, NULL);
   case WIRE_CMD_PRIOR:
-    return location_stage_set_prior(&stages->location, command->body.cmd_prior.sigma_mm,
-                                    command->body.cmd_prior.width_mm);
-  case WIRE_CMD_LOCATION_LIMIT:
-    return location_stage_set_limit(&stages->location, command->body.cmd_location_limit.limit_mm);
+    return location_stage_set_prior(&stages->location, command->body.cmd_prior.sigma_mm, command->body.cmd_prior.width_mm);
+  case WIRE_CMD_LOCATION_LIMIT: return location_stage_set_limit(&stages->location, command->body.cmd_location_limit.limit_mm);
 #endif
 #if FT_WITH_TANGENTIAL
-  case WIRE_CMD_PAD:
-    return store_profile(store, &command->body.cmd_pad.profile);
-  case WIRE_CMD_ERASE_PAD:
-    return store_put_profile(store, NULL);
+  case WIRE_CMD_PAD: return store_profile(store, &command->body.cmd_pad.profile);
+  case WIRE_CMD_ERASE_PAD: return store_put_profile(store, NULL);
 #endif
 #if FT_WITH_SYNC
-  case WIRE_CMD_SYNC:
-    return sync_set(&stages->sync, command->body.cmd_sync.mode);
+  case WIRE_CMD_SYNC: return sync_set(&stages->sync, command->body.cmd_sync.mode);
 #endif
-  default:
-    return FT_ERR_TYPE;
+  default: return FT_ERR_TYPE;
   }
 }
 

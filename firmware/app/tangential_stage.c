@@ -5,8 +5,7 @@
 
 #include <string.h>
 
-/* Least share of the force that remains from one frame to the next, and its inverse is the most: else it is another
- * contact. */
+/* Least share of the force that remains from one frame to the next, and its inverse is the most: else it is another contact. */
 #define LEAST_SHARE 0.5f
 
 void tangential_stage_start(struct tangential_stage *own, const struct fit_array *array, struct jobs *jobs) {
@@ -43,11 +42,9 @@ static bool is_answered(struct tangential_stage *own, struct jobs *jobs, struct 
   return false;
 }
 
-static void ask(struct tangential_stage *own, const struct location_stage *location, struct jobs *jobs,
-                const struct findings *found) {
+static void ask(struct tangential_stage *own, const struct location_stage *location, struct jobs *jobs, const struct findings *found) {
   const bool slow = found->frame.t_us - own->job.question.t_us >= TANGENTIAL_SLOW_us;
-  own->limit_us =
-      (slow ? TANGENTIAL_SLOW_LATE_us : TANGENTIAL_LATE_us) + (jobs_is_free(jobs, JOB_SHAPES) ? 0 : SHAPES_PART_us);
+  own->limit_us = (slow ? TANGENTIAL_SLOW_LATE_us : TANGENTIAL_LATE_us) + (jobs_is_free(jobs, JOB_SHAPES) ? 0 : SHAPES_PART_us);
   memcpy(own->question.pressure_Pa_q10, found->conditioned.pressure_Pa_q10, sizeof own->question.pressure_Pa_q10);
   own->question.settings = location->settings;
   own->question.fit = found->fit;
@@ -65,8 +62,7 @@ static void ask(struct tangential_stage *own, const struct location_stage *locat
   own->is_asked = true;
 }
 
-/* The estimate is of the frame that was asked about: since then the contact has moved, and its force has changed, as
- * the Gaussian shows. */
+/* The estimate is of the frame that was asked about: since then the contact has moved, and its force has changed, as the Gaussian shows. */
 static void take_answer(struct tangential_stage *own, struct findings *found) {
   struct fit_tangential *estimate = &own->estimate;
   const struct fit_result *then = &own->question.fit, *now = &found->fit;
@@ -89,8 +85,7 @@ static void take_answer(struct tangential_stage *own, struct findings *found) {
   estimate->q_sd_N *= share;
 }
 
-void tangential_stage_ask(struct tangential_stage *own, const struct location_stage *location, struct jobs *jobs,
-                          struct findings *found) {
+void tangential_stage_ask(struct tangential_stage *own, const struct location_stage *location, struct jobs *jobs, struct findings *found) {
   const bool asks = own->profile && found->conditioned.contact;
   own->waits = asks && jobs->pace_us >= TANGENTIAL_BESIDE_us;
   own->is_late = false;
@@ -118,8 +113,7 @@ void tangential_stage_wait(struct tangential_stage *own, struct jobs *jobs, stru
   }
 }
 
-void tangential_stage_scale(struct tangential_stage *own, const struct location_stage *location,
-                            struct findings *found) {
+void tangential_stage_scale(struct tangential_stage *own, const struct location_stage *location, struct findings *found) {
   found->contact_input.tangential = found->tangential;
   own->settings.location_sd_limit_mm = location->settings.location_sd_limit_mm;
   tangential_update(&own->history, &own->settings, &found->contact_input, &found->contact, &found->tangential_force);

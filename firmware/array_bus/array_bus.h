@@ -1,8 +1,7 @@
 /* The bus of a sensor array: the unit of work is the array, not the sensor.
  *
- * All sensors share one address, so every operation goes to all of them. Behind multiplexers they get it one after the
- * other, on parallel data lines at the same moment. An implementation fills this struct. Everything above works with
- * any of them.
+ * All sensors share one address, so every operation goes to all of them. Behind multiplexers they get it one after the other, on parallel
+ * data lines at the same moment. An implementation fills this struct. Everything above works with any of them.
  *
  * One operation runs at a time. start_* begins one and returns at once. poll advances it and reports its end. No call
  * ever waits. All calls come from the same context (the board's event interrupt, or a test), never two at once. */
@@ -17,9 +16,9 @@
 enum { ARRAY_BUS_MAX_READ_BYTES = 3 };
 
 struct array_bus_result {
-  uint32_t acknowledged; /* bitmap of the sensors that acknowledged every byte; after a command sent
-                            as a broadcast, all sensors of a branch that acknowledged as one */
-  uint32_t nacks;        /* transfers without an acknowledgement, multiplexers included */
+  uint32_t acknowledged;                                   /* bitmap of the sensors that acknowledged every byte; after a command sent
+                                                              as a broadcast, all sensors of a branch that acknowledged as one */
+  uint32_t nacks;                                          /* transfers without an acknowledgement, multiplexers included */
   uint8_t bytes[FT_MAX_SENSORS][ARRAY_BUS_MAX_READ_BYTES]; /* [sensor][byte as received]; after
                             start_read, for acknowledged sensors only */
 };
@@ -48,8 +47,7 @@ struct array_bus {
   /* Advances the operation. Every poll of one operation takes the same *result, which is written to while FT_PENDING
    * too. FT_PENDING: call again at *wake_us at the latest, or as soon as the board signals an event. FT_OK: finished,
    * *result is filled (a sensor that did not acknowledge is no error of the bus). FT_ERR_TIMEOUT: the hardware did not
-   * finish in time; recover. FT_ERR_STUCK: recovery did not free the bus; recover again later; a recovery fails in no
-   * other way. An operation ends with its first answer other than FT_PENDING; without one, poll answers
-   * FT_ERR_ARGUMENT. */
+   * finish in time; recover. FT_ERR_STUCK: recovery did not free the bus; recover again later; a recovery fails in no other way. An
+   * operation ends with its first answer other than FT_PENDING; without one, poll answers FT_ERR_ARGUMENT. */
   enum ft_status (*poll)(void *context, uint64_t now_us, struct array_bus_result *result, uint64_t *wake_us);
 };

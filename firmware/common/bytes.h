@@ -18,13 +18,9 @@ static inline void bytes_put_u32(uint8_t *to, uint32_t value) {
 
 static inline uint16_t bytes_get_u16(const uint8_t *from) { return (uint16_t)(from[0] | (uint16_t)from[1] << 8); }
 
-static inline uint32_t bytes_get_u32(const uint8_t *from) {
-  return bytes_get_u16(from) | (uint32_t)bytes_get_u16(from + 2) << 16;
-}
+static inline uint32_t bytes_get_u32(const uint8_t *from) { return bytes_get_u16(from) | (uint32_t)bytes_get_u16(from + 2) << 16; }
 
-static inline uint64_t bytes_get_u64(const uint8_t *from) {
-  return bytes_get_u32(from) | (uint64_t)bytes_get_u32(from + 4) << 32;
-}
+static inline uint64_t bytes_get_u64(const uint8_t *from) { return bytes_get_u32(from) | (uint64_t)bytes_get_u32(from + 4) << 32; }
 
 /* IEEE 754 binary32 by its bits. */
 static inline uint32_t bytes_from_f32(float value) {

@@ -63,8 +63,7 @@ struct crash_record {
   /* The last events, newest first */
   uint8_t event_codes[CRASH_EVENTS]; /* enum crash_event */
   uint8_t event_details[CRASH_EVENTS];
-  /* As the exception stacked them; all 0 where sp pointed nowhere, or nothing took note. sp is that
-   * of the code at pc. */
+  /* As the exception stacked them; all 0 where sp pointed nowhere, or nothing took note. sp is that of the code at pc. */
   uint32_t r0, r1, r2, r3, r12, lr, pc, xpsr, sp;
   uint32_t event_ages_1024us[CRASH_EVENTS]; /* how long before the end, in 1024 us; saturates */
   uint64_t t_us;                            /* of the end, since the start before it */

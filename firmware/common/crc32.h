@@ -21,13 +21,9 @@ static inline __attribute__((always_inline)) uint32_t crc32_half_step(uint32_t c
   return (crc >> 4) ^ remainder;
 }
 
-static inline __attribute__((always_inline)) uint32_t crc32_step(uint32_t crc) {
-  return crc32_half_step(crc32_half_step(crc));
-}
+static inline __attribute__((always_inline)) uint32_t crc32_step(uint32_t crc) { return crc32_half_step(crc32_half_step(crc)); }
 
-static inline __attribute__((always_inline)) uint32_t crc32_add_u8(uint32_t crc, uint8_t value) {
-  return crc32_step(crc ^ value);
-}
+static inline __attribute__((always_inline)) uint32_t crc32_add_u8(uint32_t crc, uint8_t value) { return crc32_step(crc ^ value); }
 
 static inline __attribute__((always_inline)) uint32_t crc32_add_u16(uint32_t crc, uint16_t value) {
   return crc32_step(crc32_step(crc ^ value));

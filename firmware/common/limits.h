@@ -13,7 +13,6 @@
 #define FT_AIR_MIN_Pa 30000
 #define FT_AIR_MAX_Pa 120000
 
-/* Moulding presses on the sensors: at rest those of four real strips differed by 2 to 12 kPa. A sensitivity that is off
- * by 1 % moves the reading at 1 bar by 2.9 kPa: what is apart by less than this is no worse than the gains of a pad may
- * be. */
+/* Moulding presses on the sensors: at rest those of four real strips differed by 2 to 12 kPa. A sensitivity that is off by 1 % moves the
+ * reading at 1 bar by 2.9 kPa: what is apart by less than this is no worse than the gains of a pad may be. */
 #define FT_APART_MAX_Pa 20000

@@ -3,16 +3,14 @@
 #include <stddef.h>
 #include <string.h>
 
-_Static_assert(offsetof(struct pad_profile, from_touch) == PAD_PROFILE_FLOATS * sizeof(float),
-               "floats lie behind one another");
+_Static_assert(offsetof(struct pad_profile, from_touch) == PAD_PROFILE_FLOATS * sizeof(float), "floats lie behind one another");
 
 /* False for NaN too. */
 static bool is_within(float value, float least, float greatest) { return value >= least && value <= greatest; }
 
 bool pad_profile_is_valid(const struct pad_profile *profile) {
   bool valid = is_within(profile->thickness_mm, PAD_THICKNESS_MIN_mm, PAD_THICKNESS_MAX_mm) &&
-               is_within(profile->overhang_mm, 0.0f, PAD_OVERHANG_MAX_mm) &&
-               is_within(profile->spread_mm2, 0.0f, PAD_SPREAD_MAX_mm2) &&
+               is_within(profile->overhang_mm, 0.0f, PAD_OVERHANG_MAX_mm) && is_within(profile->spread_mm2, 0.0f, PAD_SPREAD_MAX_mm2) &&
                is_within(profile->spread_sd_mm2, PAD_SPREAD_SD_MIN_mm2, PAD_SPREAD_SD_MAX_mm2) &&
                is_within(profile->force_ratio, PAD_FORCE_RATIO_MIN, PAD_FORCE_RATIO_MAX) &&
                is_within(profile->tangential_scale, PAD_TANGENTIAL_SCALE_MIN, PAD_TANGENTIAL_SCALE_MAX) &&

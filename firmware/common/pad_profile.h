@@ -1,6 +1,5 @@
-/* How the rubber of one pad spreads a press and a pull. The host computes it from the pad's
- * thickness and overhang (`fingertip pad`). The packets carry it, the fingertip keeps it, and the
- * estimate of tangential force uses it (fit_tangential.h).
+/* How the rubber of one pad spreads a press and a pull. The host computes it from the pad's thickness and overhang (`fingertip pad`). The
+ * packets carry it, the fingertip keeps it, and the estimate of tangential force uses it (fit_tangential.h).
  *
  * Lengths are those of one bonded layer, so all of them grow with its thickness. Let t2 be the contact's own spread
  * (variance of its pressure along one axis, mm^2). A contact that presses by F gives on the base

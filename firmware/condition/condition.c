@@ -64,9 +64,8 @@ static void take(struct condition *condition, uint8_t k, int32_t reading_Pa_q10)
   condition->calm.snapshots = 0;
 }
 
-/* Takes the readings of sensors that are tared now, and returns the bitmap of those that were. In a contact that others
- * measure it waits, but not for ever, for wrong zeros may make it: what is taken then is a guess until the contact
- * ends. */
+/* Takes the readings of sensors that are tared now, and returns the bitmap of those that were. In a contact that others measure it waits,
+ * but not for ever, for wrong zeros may make it: what is taken then is a guess until the contact ends. */
 static uint32_t tare_sensors(struct condition *condition, const struct frame *frame, uint32_t readable) {
   uint32_t ready = readable;
   uint32_t guesses = condition->gate.pressed ? 0 : condition->guessed;
@@ -94,13 +93,12 @@ static uint32_t tare_sensors(struct condition *condition, const struct frame *fr
 /* value / gain, |value| <= 2^29 and 1 / gain <= 4, to 1/1024 Pa below. */
 static int32_t scaled_by(int32_t value, uint32_t inverse_q16) {
   uint32_t low = (uint32_t)value & 0xFFFF;
-  return (value >> 16) * (int32_t)inverse_q16 + (int32_t)(low * (inverse_q16 >> 16)) +
-         (int32_t)(low * (inverse_q16 & 0xFFFF) >> 16);
+  return (value >> 16) * (int32_t)inverse_q16 + (int32_t)(low * (inverse_q16 >> 16)) + (int32_t)(low * (inverse_q16 & 0xFFFF) >> 16);
 }
 
 /* Fills in pressures and peak; the strongest sensor is the answer. */
-static uint8_t read_sensors(const struct condition *condition, const struct frame *frame,
-                            const struct condition_gains *gains, struct conditioned *conditioned) {
+static uint8_t read_sensors(const struct condition *condition, const struct frame *frame, const struct condition_gains *gains,
+                            struct conditioned *conditioned) {
   int32_t peak = 0;
   uint8_t strongest = 0;
   uint32_t ready = conditioned->usable;
@@ -109,8 +107,7 @@ static uint8_t read_sensors(const struct condition *condition, const struct fram
       conditioned->pressure_Pa_q10[k] = 0;
       continue;
     }
-    int32_t above =
-        clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k] - condition->faded_Pa_q10[k]);
+    int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k] - condition->faded_Pa_q10[k]);
     if (gains) {
       above = scaled_by(clamp(above, -PRESSURE_MAX, PRESSURE_MAX - 1), gains->inverse_q16[k]);
     }
@@ -153,8 +150,7 @@ static void begin_contact(struct condition *condition, const struct conditioned 
     condition->sensor[k].reached_Pa_q10 = 0;
     condition->margin_Pa_q10[k] = 0;
   }
-  /* What the zeros took of this contact itself, while it was within the band, counts twice: where it then moves they
-   * are off as before. */
+  /* What the zeros took of this contact itself, while it was within the band, counts twice: where it then moves they are off as before. */
   const int32_t taken = taken_into_zeros(condition, conditioned->usable, count);
   const int32_t of_this = condition->touched ? larger(taken - condition->taken_before_Pa_q10, 0) : 0;
   condition->strong_Pa_q10 = TAKEN_FACTOR * (taken + of_this);
@@ -170,9 +166,8 @@ static void end_contact(struct condition *condition, uint8_t count) {
 
 static void watch_calm(struct condition *condition, const struct conditioned *conditioned, uint8_t count) {
   struct snapshot snapshot;
-  const bool calm = !condition->gate.pressed && conditioned->tared &&
-                    (condition->restless & conditioned->usable) == 0 && condition->tared_ms >= CALM_AFTER_TARE_ms &&
-                    condition->gate.released_ms >= CALM_AFTER_RELEASE_ms;
+  const bool calm = !condition->gate.pressed && conditioned->tared && (condition->restless & conditioned->usable) == 0 &&
+                    condition->tared_ms >= CALM_AFTER_TARE_ms && condition->gate.released_ms >= CALM_AFTER_RELEASE_ms;
   if (calm && calm_is_due(&condition->calm, condition->now_ms, &snapshot)) {
     for (uint8_t k = 0; k < count; k++) {
       calm_take(&condition->sensor[k].drift, condition->sensor[k].level_Pa_q10, &snapshot);
@@ -206,8 +201,8 @@ static void begin_frame(struct condition *condition, const struct frame *frame) 
 }
 
 /* The strongest decides, except where its own margin is larger than that of others. */
-static bool is_over(const struct condition *condition, const struct frame *frame, const struct conditioned *conditioned,
-                    uint8_t strongest, int32_t limit) {
+static bool is_over(const struct condition *condition, const struct frame *frame, const struct conditioned *conditioned, uint8_t strongest,
+                    int32_t limit) {
   const int32_t *margin = condition->margin_Pa_q10;
   if (frame->saturated != 0 || conditioned->peak_Pa_q10 > limit + margin[strongest]) {
     return true;
@@ -220,11 +215,9 @@ static bool is_over(const struct condition *condition, const struct frame *frame
 }
 
 /* Returns whether a contact begins or ends with this frame. */
-static bool move_gate(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned,
-                      uint8_t strongest) {
+static bool move_gate(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned, uint8_t strongest) {
   struct gate *gate = &condition->gate;
-  const bool over =
-      is_over(condition, frame, conditioned, strongest, gate->pressed ? gate->close_Pa_q10 : gate->open_Pa_q10);
+  const bool over = is_over(condition, frame, conditioned, strongest, gate->pressed ? gate->close_Pa_q10 : gate->open_Pa_q10);
   if (over == gate->pressed) {
     return false;
   }
@@ -234,16 +227,13 @@ static bool move_gate(struct condition *condition, const struct frame *frame, co
 }
 
 /* Whether the zero follows this contact as if nothing touched. */
-static bool is_unsure(const struct condition *condition, const struct conditioned *conditioned, int32_t peak,
-                      bool saturated) {
+static bool is_unsure(const struct condition *condition, const struct conditioned *conditioned, int32_t peak, bool saturated) {
   return condition->gate.pressed && !saturated &&
-         (condition->guessed != 0 || (condition->firm & conditioned->usable) == 0 ||
-          peak < update_drift_in(condition->gate.pressed_ms));
+         (condition->guessed != 0 || (condition->firm & conditioned->usable) == 0 || peak < update_drift_in(condition->gate.pressed_ms));
 }
 
 /* Sets .sure, and returns whether a force and a zero that has moved look alike. After the updates of this frame. */
-static bool is_doubtful(struct condition *condition, const struct conditioned *conditioned, int32_t peak,
-                        bool saturated) {
+static bool is_doubtful(struct condition *condition, const struct conditioned *conditioned, int32_t peak, bool saturated) {
   const uint32_t usable = conditioned->usable;
   if (!condition->gate.pressed) {
     condition->sure = false;
@@ -289,8 +279,7 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
     condition->taken_before_Pa_q10 = taken_into_zeros(condition, conditioned->usable, count);
   }
   condition->touched = conditioned->contact;
-  conditioned->tared =
-      readable != 0 && conditioned->usable == readable && (condition->below & conditioned->usable) == 0;
+  conditioned->tared = readable != 0 && conditioned->usable == readable && (condition->below & conditioned->usable) == 0;
   watch_calm(condition, conditioned, count);
   conditioned->zero_doubtful = is_doubtful(condition, conditioned, peak, saturated);
 }

@@ -9,10 +9,9 @@
  * - Taken: the mean of ZERO_TARE_FRAMES readings without the smallest and the largest; at rates below 16 Hz of three
  * and more.
  * - Settled: rubber and sensors warm up. A level that was just taken may be off by its spread, ZERO_COLD_Pa for a
- * sensor that was off or is another, ZERO_WARM_Pa for one that was calm before. While there is a spread the level takes
- * over all readings within it, and the gate is higher by it: a weaker touch is not seen. The spread fades by evidence,
- * to three times what the reading moves in a second. A calm sensor has none after two seconds, one that creeps after
- * fifteen.
+ * sensor that was off or is another, ZERO_WARM_Pa for one that was calm before. While there is a spread the level takes over all readings
+ * within it, and the gate is higher by it: a weaker touch is not seen. The spread fades by evidence, to three times what the reading moves
+ * in a second. A calm sensor has none after two seconds, one that creeps after fifteen.
  * - Followed: then the level moves at 0.5 Pa/s. A force that rises faster is no drift. In a contact it does not move,
  * except for the drift of the calm before it (calm.h), for an hour.
  * - Taken again: a reading below what a release explains means that the level was taken under a press. The sensor is
@@ -42,8 +41,7 @@
  * moved, taken is what level and remainder moved since the zero was proven. A press without doubt proves it: what the
  * zero comes back to after that press is the zero. Without evidence both fade in minutes. Doubtful is
  * - a contact in which no sensor measures more than its zero wandered, half as much again; or no more than barometers
- * drift in such a time; or while a zero is a guess. This one is unsure: the zero follows it slowly, as if nothing
- * touched
+ * drift in such a time; or while a zero is a guess. This one is unsure: the zero follows it slowly, as if nothing touched
  * - a contact whose sensors have crept up, by less than 24 Pa/s all the time, 0.005 N/s on 12 mm of rubber, and to less
  * than 3.9 kPa
  * - a contact less than three times what its zeros had taken when it left the band, or six times what they had taken of
@@ -59,9 +57,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Whether anything touches the pad. The gate opens above GATE_OPEN_Pa + GATE_OPEN_SIGMA standard deviations of the
- * noise, and closes below GATE_CLOSE_Pa + GATE_CLOSE_SIGMA. A sensor's margin comes on top of both. The pascals are for
- * zeros that move without a touch. */
+/* Whether anything touches the pad. The gate opens above GATE_OPEN_Pa + GATE_OPEN_SIGMA standard deviations of the noise, and closes below
+ * GATE_CLOSE_Pa + GATE_CLOSE_SIGMA. A sensor's margin comes on top of both. The pascals are for zeros that move without a touch. */
 struct gate {
   bool pressed;                      /* a contact that is no remainder */
   uint32_t pressed_ms, released_ms;  /* since it began, and since it ended; at most a day */

@@ -1,13 +1,12 @@
-/* The constants of the condition: meaning, unit, source. "Strips": the recordings of real strips of barometers under
- * rubber, which host_tools/report/real judges. "Choice": any value near it gives the same. ZERO.md lists what half and
- * twice of them changes. */
+/* The constants of the condition: meaning, unit, source. "Strips": the recordings of real strips of barometers under rubber, which
+ * host_tools/report/real judges. "Choice": any value near it gives the same. ZERO.md lists what half and twice of them changes. */
 #pragma once
 
 #include "condition/fixed.h"
 
 /* Time. */
-#define UPDATE_ms 64      /* between two updates of a sensor; choice, a twentieth of its time constants */
-#define STEP_MAX_ms 16383 /* a longer gap counts as this; range of the products */
+#define UPDATE_ms 64                          /* between two updates of a sensor; choice, a twentieth of its time constants */
+#define STEP_MAX_ms 16383                     /* a longer gap counts as this; range of the products */
 #define AGE_MAX_ms ((uint32_t)SECONDS(86400)) /* an age stops there; range */
 #define SLOW_ms SECONDS(1)                    /* low pass of the readings; choice */
 
@@ -35,12 +34,12 @@
 #define SETTLE_ms MS(500)                         /* time constant of the spread; choice */
 #define SETTLE_LONGEST_ms ((uint32_t)SECONDS(15)) /* a sensor that creeps counts as settled then; choice */
 #define SETTLED_Pa 8                              /* and a sigma: a smaller spread is none */
-#define SETTLE_SLOW 3 /* times what the reading moves in a second: the spread's goal; choice */
+#define SETTLE_SLOW 3                             /* times what the reading moves in a second: the spread's goal; choice */
 
 /* Following. */
-#define SLEW_SHIFT 1         /* 0.5 Pa/s; strips at rest: 130 to 210 Pa in 16 min, 0.22 Pa/s at most */
-#define FOLLOW_ms SECONDS(2) /* time constant of the level; choice */
-#define KEEP_DOWN_SHIFT 2    /* a quarter of a remainder downward: what dipped comes back */
+#define SLEW_SHIFT 1                               /* 0.5 Pa/s; strips at rest: 130 to 210 Pa in 16 min, 0.22 Pa/s at most */
+#define FOLLOW_ms SECONDS(2)                       /* time constant of the level; choice */
+#define KEEP_DOWN_SHIFT 2                          /* a quarter of a remainder downward: what dipped comes back */
 #define DRIFT_GOES_ON_ms ((uint32_t)SECONDS(3600)) /* the drift before a contact holds in it for an hour; choice */
 #define STILL_SIGMA 3                              /* a rise of 3 sigma between two updates is no remainder's */
 #define FALL_SHIFT 2                               /* nor a fall by a quarter of the pressure */
@@ -52,30 +51,30 @@
 #define FAR_BELOW_ms MS(500)           /* but this; choice */
 
 /* What rubber keeps of a press (strips: 0.4 to 13 % above, 1 to 15 % below, for 0.5 to 20 s). */
-#define MEMORY_ms SECONDS(20) /* time constant of the memory */
-#define SATURATED_Pa 100000   /* counts for a press beyond the range of a sensor */
-#define BAND_SHIFT 3          /* an eighth of the memory may remain; ZERO.md: a sixteenth and a quarter fail */
-#define DIP_SHIFT 2           /* a quarter may be missing */
-#define REOPEN_SHIFT 4        /* a sixteenth: what a sudden press must exceed after FRESH_ms */
-#define PAST_ms SECONDS(3)    /* time constant of what it keeps, and of a hold's own part; strips: 1 to 4 s */
-#define PAST_SHARE 1311       /* 2 % of it is the sd until a release shows it; the twin's after-effect: 2.3 % rms */
-#define PAST_SHARE_LEAST 655  /* 1 %: one release may hide it */
-#define PAST_SHARE_MOST 16384 /* a quarter; range */
-#define PAST_SHARE_FORCE 3277 /* a twentieth: twice the sd that it shows is the band of all, an eighth */
+#define MEMORY_ms SECONDS(20)             /* time constant of the memory */
+#define SATURATED_Pa 100000               /* counts for a press beyond the range of a sensor */
+#define BAND_SHIFT 3                      /* an eighth of the memory may remain; ZERO.md: a sixteenth and a quarter fail */
+#define DIP_SHIFT 2                       /* a quarter may be missing */
+#define REOPEN_SHIFT 4                    /* a sixteenth: what a sudden press must exceed after FRESH_ms */
+#define PAST_ms SECONDS(3)                /* time constant of what it keeps, and of a hold's own part; strips: 1 to 4 s */
+#define PAST_SHARE 1311                   /* 2 % of it is the sd until a release shows it; the twin's after-effect: 2.3 % rms */
+#define PAST_SHARE_LEAST 655              /* 1 %: one release may hide it */
+#define PAST_SHARE_MOST 16384             /* a quarter; range */
+#define PAST_SHARE_FORCE 3277             /* a twentieth: twice the sd that it shows is the band of all, an eighth */
 #define PAST_SHOWS_ms ((uint32_t)MS(200)) /* after a contact; the remainder follows in 100 ms */
 #define PAST_LEAST_Pa 1000                /* less shows nothing beside noise and drift */
 #define PAST_SDS 2                        /* the zero is within as many of where it comes to rest */
 #define PAST_LEARN_SHIFT 2                /* a quarter of what each release shows; choice */
-#define CROSS_SHIFT 1 /* half of the strongest memory counts for all: far sensors keep 2 % of a peak */
-#define FRESH_ms ((uint32_t)SECONDS(2)) /* after a contact: a remainder may rise */
-#define REMAINDER_ms MS(700)            /* time constant of a remainder; strips: 0.5 s at least */
-#define REMAINDER_DOWN_ms MS(100)       /* the same when a force goes at last */
-#define KEEP_SHIFT 8                    /* 1/256 of the memory in a second: the level takes over the remainder, */
-#define CREEP_SHIFT 10                  /* 1/1024: what the remainder does not follow, */
-#define DRIFTED_SHIFT 3                 /* and an eighth of what may have drifted */
-#define DRIFT_SHIFT 2                   /* 0.24 Pa/s: drift of a contact; strips: 0.22 Pa/s */
-#define DRIFT_MAX_Pa 900                /* of that in an hour */
-#define DRIFTED_ms SECONDS(8)           /* time constant with which it fades after the contact; choice */
+#define CROSS_SHIFT 1                     /* half of the strongest memory counts for all: far sensors keep 2 % of a peak */
+#define FRESH_ms ((uint32_t)SECONDS(2))   /* after a contact: a remainder may rise */
+#define REMAINDER_ms MS(700)              /* time constant of a remainder; strips: 0.5 s at least */
+#define REMAINDER_DOWN_ms MS(100)         /* the same when a force goes at last */
+#define KEEP_SHIFT 8                      /* 1/256 of the memory in a second: the level takes over the remainder, */
+#define CREEP_SHIFT 10                    /* 1/1024: what the remainder does not follow, */
+#define DRIFTED_SHIFT 3                   /* and an eighth of what may have drifted */
+#define DRIFT_SHIFT 2                     /* 0.24 Pa/s: drift of a contact; strips: 0.22 Pa/s */
+#define DRIFT_MAX_Pa 900                  /* of that in an hour */
+#define DRIFTED_ms SECONDS(8)             /* time constant with which it fades after the contact; choice */
 
 /* Doubt: a force and a zero that has moved look alike. */
 #define WANDER_ms SECONDS(120) /* without evidence a doubt fades in minutes; choice */
@@ -90,10 +89,10 @@
 #define SNAPSHOT_LONGEST_ms ((uint32_t)SECONDS(64))   /* at last: 8 of them span 512 s */
 #define CALM_AFTER_TARE_ms ((uint32_t)SECONDS(3))     /* begin of a calm after a tare, */
 #define CALM_AFTER_RELEASE_ms ((uint32_t)SECONDS(60)) /* and after a contact: what rubber keeps goes slowly */
-#define CALM_LAG_Pa 2           /* and half a sigma: most that a calm reading is above the level */
-#define DRIFT_LEAST_s 8         /* shorter calms show no drift */
-#define DRIFT_LONGEST_s 512     /* longer ones count as this; range of the products */
-#define DRIFT_CHANGE_MAX_Pa 300 /* of the level in a calm; range: 0.5 Pa/s for 512 s is less */
-#define DRIFT_FASTEST_q12 1280  /* 0.31 Pa/s: at more the level is too slow to know the drift after a minute */
-#define DRIFT_SD_mPa_s 250      /* standard deviation of drifts; strips: 0.22 Pa/s at most */
-#define LEVEL_SD_mPa 1000       /* of a change of the level between two snapshots */
+#define CALM_LAG_Pa 2                                 /* and half a sigma: most that a calm reading is above the level */
+#define DRIFT_LEAST_s 8                               /* shorter calms show no drift */
+#define DRIFT_LONGEST_s 512                           /* longer ones count as this; range of the products */
+#define DRIFT_CHANGE_MAX_Pa 300                       /* of the level in a calm; range: 0.5 Pa/s for 512 s is less */
+#define DRIFT_FASTEST_q12 1280                        /* 0.31 Pa/s: at more the level is too slow to know the drift after a minute */
+#define DRIFT_SD_mPa_s 250                            /* standard deviation of drifts; strips: 0.22 Pa/s at most */
+#define LEVEL_SD_mPa 1000                             /* of a change of the level between two snapshots */

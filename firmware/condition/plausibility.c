@@ -5,8 +5,7 @@
 
 #define INTERVAL_us 2000000u /* between two comparisons */
 
-bool plausibility_compare(struct plausibility *plausibility, const struct frame *frame,
-                          const struct conditioned *conditioned) {
+bool plausibility_compare(struct plausibility *plausibility, const struct frame *frame, const struct conditioned *conditioned) {
   const uint32_t usable = conditioned->usable;
   if (usable == plausibility->compared && frame->t_us < plausibility->next_us) {
     return false;

@@ -55,8 +55,7 @@ static void follow_past(const struct step *step) {
   step->condition->past_sd_Pa_q10[step->k] = part_of(sensor->past_Pa_q10, sensor->past_share);
 }
 
-/* What five and more sensors all keep is a force that is left: rubber keeps unlike shares. Of fewer it may be either.
- */
+/* What five and more sensors all keep is a force that is left: rubber keeps unlike shares. Of fewer it may be either. */
 static bool is_left_by_force(const struct condition *condition) {
   int pressed = 0;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
@@ -84,8 +83,7 @@ static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
     const int32_t most = part_of(sensor->past_Pa_q10, PAST_SHARE_MOST);
     const int32_t off = clamp(size_of(above_level_Pa_q10) - step->condition->drifted_Pa_q10, 0, most);
     const int32_t shown = port_divide(off + off / 4, sensor->past_Pa_q10 >> 16);
-    sensor->past_share =
-        larger(sensor->past_share + ((shown - sensor->past_share) >> PAST_LEARN_SHIFT), PAST_SHARE_LEAST);
+    sensor->past_share = larger(sensor->past_share + ((shown - sensor->past_share) >> PAST_LEARN_SHIFT), PAST_SHARE_LEAST);
   }
 }
 
@@ -215,8 +213,7 @@ static void hold(const struct step *step) {
 }
 
 /* The zero is what level and remainder are now: what it may be off by grows by what they have moved. */
-static void set_zero(const struct step *step, int32_t remainder_Pa_q10, int32_t level_moved_Pa_q10,
-                     int32_t moved_Pa_q10) {
+static void set_zero(const struct step *step, int32_t remainder_Pa_q10, int32_t level_moved_Pa_q10, int32_t moved_Pa_q10) {
   struct condition *condition = step->condition;
   struct condition_sensor *sensor = step->sensor;
   const int32_t spread = sensor->spread_Pa_q10;
@@ -240,8 +237,7 @@ static bool settle(const struct step *step) {
   int32_t goal = SETTLE_SLOW * size_of(step->slow_Pa_q10);
   goal = goal > spread ? spread : goal;
   spread += part_of(goal - spread, share_in(step->ms, SETTLE_ms));
-  const bool settled =
-      spread < Pa_q10(SETTLED_Pa) + step->noise_Pa_q10 || condition->now_ms - sensor->tare_begun_ms > SETTLE_LONGEST_ms;
+  const bool settled = spread < Pa_q10(SETTLED_Pa) + step->noise_Pa_q10 || condition->now_ms - sensor->tare_begun_ms > SETTLE_LONGEST_ms;
   sensor->spread_Pa_q10 = settled ? 0 : spread;
   set_zero(step, 0, 0, 0);
   condition->margin_Pa_q10[step->k] = sensor->spread_Pa_q10;
@@ -288,9 +284,8 @@ static int32_t follow_level(const struct step *step, const struct band *band, bo
   return crept + kept;
 }
 
-/* A sensor that has been below was tared under a press, and so were all others: those that are far below now are tared
- * with it, at their next update, and those beside them settle. The dip that it was may come back, so it counts as
- * taken. */
+/* A sensor that has been below was tared under a press, and so were all others: those that are far below now are tared with it, at their
+ * next update, and those beside them settle. The dip that it was may come back, so it counts as taken. */
 static void tare_again(struct condition *condition, uint8_t k, bool far, int32_t above_level_Pa_q10) {
   for (uint8_t j = 0; j < FT_MAX_SENSORS; j++) {
     struct condition_sensor *other = &condition->sensor[j];
@@ -349,8 +344,7 @@ static bool moves(const struct step *step, int32_t before_Pa_q10, int32_t above_
   return rise > still || rise < -still - (larger(above_Pa_q10, 0) >> FALL_SHIFT);
 }
 
-void update_sensor(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned,
-                   uint8_t k) {
+void update_sensor(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned, uint8_t k) {
   struct condition_sensor *sensor = &condition->sensor[k];
   const uint32_t bit = UINT32_C(1) << k;
   const uint32_t gap_ms = condition->now_ms - sensor->updated_ms;

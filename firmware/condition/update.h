@@ -1,12 +1,10 @@
-/* One pass over all that is remembered of one sensor: condition.h has the meaning of each part. For condition.c only.
- */
+/* One pass over all that is remembered of one sensor: condition.h has the meaning of each part. For condition.c only. */
 #pragma once
 
 #include "condition/condition.h"
 
 /* Updates sensor k with the frame just processed. */
-void update_sensor(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned,
-                   uint8_t k);
+void update_sensor(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned, uint8_t k);
 
 /* Begins a tare of sensor k: until it ends there is no answer from it. The new level may be off by the spread. */
 void update_begin_tare(struct condition *condition, uint8_t k, int32_t spread_Pa_q10);

@@ -15,10 +15,9 @@
 
 #define DEFAULT_FIT_ITERATIONS FINGERTIP_FIT_ITERATIONS
 
-/* A Gaussian is never negative, but rubber is: it bulges beside a contact, and sensors three to five
- * sigma away read -1 to -2 % of the peak (host_tools/report/real). Such a reading counts as zero
- * from this number of noise sd below it. A tangential force makes readings negative too, so where a pad's
- * profile is in use they stay as they are. The paper's scene keeps the paper's fit. */
+/* A Gaussian is never negative, but rubber is: it bulges beside a contact, and sensors three to five sigma away read -1 to -2 % of the peak
+ * (host_tools/report/real). Such a reading counts as zero from this number of noise sd below it. A tangential force makes readings negative
+ * too, so where a pad's profile is in use they stay as they are. The paper's scene keeps the paper's fit. */
 #ifdef FINGERTIP_SCENE_PAPER
 #define DEFAULT_CUT_NOISES 0u
 #define DEFAULT_USES_SHAPE 0

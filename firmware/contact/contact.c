@@ -18,15 +18,13 @@ static bool shows_motion(const struct contact_input *input, uint32_t flags) {
          input->fit->location_noise_mm <= CONTACT_JITTER_MAX_mm;
 }
 
-struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit,
-                                   float largest_Pa) {
+struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit, float largest_Pa) {
   const bool is_known = !(fit->flags & CONTACT_FLAG_AT_BOUND) && fit->location_sd_mm <= fit->sigma_mm;
   const bool exceeds = !is_known && fit->p0_Pa > largest_Pa;
   const float force_N = exceeds ? fit->force_N * largest_Pa / fit->p0_Pa : fit->force_N;
   struct contact_force weighed = {settings->force_scale * force_N, 0.0f};
   if (fit->flags & CONTACT_FLAG_UNCERTAINTY_VALID) {
-    weighed.force_sd_N =
-        fit_quadrature(settings->force_scale, exceeds ? force_N : fit->force_sd_N, settings->force_scale_sd, force_N);
+    weighed.force_sd_N = fit_quadrature(settings->force_scale, exceeds ? force_N : fit->force_sd_N, settings->force_scale_sd, force_N);
   }
   return weighed;
 }
@@ -67,15 +65,14 @@ static bool is_passed_over(struct slip_history *history, uint32_t used) {
   return false;
 }
 
-void contact_update(struct slip_history *history, const struct contact_settings *settings,
-                    const struct contact_input *input, struct contact_result *result) {
+void contact_update(struct slip_history *history, const struct contact_settings *settings, const struct contact_input *input,
+                    struct contact_result *result) {
   contact_judge(input, result);
   uint32_t flags = result->flags;
   if (!input->fit || !shows_motion(input, flags)) {
     slip_reset(history);
   } else if (!is_passed_over(history, input->fit->used & ~input->unsettled) &&
-             slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm, settings->slip_window_us,
-                         &result->slip_mm)) {
+             slip_update(history, input->t_us, input->fit->x_mm, input->fit->y_mm, settings->slip_window_us, &result->slip_mm)) {
     flags |= CONTACT_FLAG_SLIP_VALID;
     if (result->slip_mm > settings->slip_threshold_mm) {
       flags |= CONTACT_FLAG_SLIP;

@@ -47,8 +47,7 @@ bool contact_is_lower_bound(const struct fit_result *fit, uint32_t saturated);
 /* The force of a fit, scaled; its standard deviation holds that of the scale. largest_Pa: reading, of any size where a
  * sensor is saturated. A fit at its bound, or whose middle is not known to within its width, may have any pressure
  * there: its force is at most what the largest reading makes of its width, and so is its standard deviation. */
-struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit,
-                                   float largest_Pa);
+struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit, float largest_Pa);
 
 /* Without slip. */
 void contact_judge(const struct contact_input *input, struct contact_result *result);
@@ -60,5 +59,5 @@ void contact_judge(const struct contact_input *input, struct contact_result *res
  * first frame of other sensors, settled or not (motion.h). The tangential force is estimated from every frame. */
 #define CONTACT_JITTER_MAX_mm 0.2f
 
-void contact_update(struct slip_history *history, const struct contact_settings *settings,
-                    const struct contact_input *input, struct contact_result *result);
+void contact_update(struct slip_history *history, const struct contact_settings *settings, const struct contact_input *input,
+                    struct contact_result *result);

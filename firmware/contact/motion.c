@@ -46,9 +46,7 @@ void motion_reset(struct motion_history *history) {
 }
 
 /* Place of the entry with this age, counted from the newest. */
-static uint32_t place_of(const struct motion_ring *ring, uint32_t back) {
-  return (ring->newest - back) % MOTION_ENTRIES;
-}
+static uint32_t place_of(const struct motion_ring *ring, uint32_t back) { return (ring->newest - back) % MOTION_ENTRIES; }
 
 static uint32_t enter(struct motion_ring *ring, const struct motion_sums *sums) {
   ring->newest++;
@@ -103,8 +101,7 @@ static int32_t um_from_ratio(int32_t ratio_q12, int32_t scale_q8) {
   return clamped(ratio_q12 * (MOTION_PER_RATIO_mm * 125) / 512 * scale_q8 / 256, CHANGE_MAX_um);
 }
 
-static struct change change_of(const struct motion_history *history, const struct motion_ring *ring,
-                               const struct pair_spans *spans) {
+static struct change change_of(const struct motion_history *history, const struct motion_ring *ring, const struct pair_spans *spans) {
   const struct motion_sums *now = &history->now;
   uint32_t latest = back_to(ring, now->t_us, spans->latest_us);
   uint32_t end = back_to(ring, now->t_us, spans->gap_end_us);
@@ -119,18 +116,14 @@ static struct change change_of(const struct motion_history *history, const struc
   struct change change;
   change.x_um = um_from_q11(mean_of(now->x, c->x, since) - mean_of(b->x, a->x, before));
   change.y_um = um_from_q11(mean_of(now->y, c->y, since) - mean_of(b->y, a->y, before));
-  change.ratio_x_um = um_from_ratio(mean_of(now->ratio_x, c->ratio_x, since) - mean_of(b->ratio_x, a->ratio_x, before),
-                                    history->scale_q8);
-  change.ratio_y_um = um_from_ratio(mean_of(now->ratio_y, c->ratio_y, since) - mean_of(b->ratio_y, a->ratio_y, before),
-                                    history->scale_q8);
-  change.variance_um2 = port_divide(mean_of(now->variance, c->variance, since), since) +
-                        port_divide(mean_of(b->variance, a->variance, before), before);
+  change.ratio_x_um = um_from_ratio(mean_of(now->ratio_x, c->ratio_x, since) - mean_of(b->ratio_x, a->ratio_x, before), history->scale_q8);
+  change.ratio_y_um = um_from_ratio(mean_of(now->ratio_y, c->ratio_y, since) - mean_of(b->ratio_y, a->ratio_y, before), history->scale_q8);
+  change.variance_um2 =
+      port_divide(mean_of(now->variance, c->variance, since), since) + port_divide(mean_of(b->variance, a->variance, before), before);
   return change;
 }
 
-static int32_t squared_way(const struct change *change) {
-  return change->x_um * change->x_um + change->y_um * change->y_um;
-}
+static int32_t squared_way(const struct change *change) { return change->x_um * change->x_um + change->y_um * change->y_um; }
 
 /* Squared way that is not to be believed; of a slide under way, a quarter of it. */
 static int32_t squared_doubt(const struct change *change, bool already) {
@@ -232,8 +225,8 @@ static bool find_velocity(struct motion_history *history) {
   const uint32_t per_um2 = 4398047u * MOTION_NOISE_SDS * MOTION_NOISE_SDS;
   int32_t least = QUOTIENTS_PER_mm_s * (history->moving ? MOTION_MOVING_ENDS_mm_s : MOTION_MOVING_mm_s);
   uint32_t v2 = (uint32_t)(vx_q10 * vx_q10) + (uint32_t)(vy_q10 * vy_q10);
-  history->moving = v2 > (uint32_t)(least * least) &&
-                    (uint64_t)v2 * (uint32_t)spread > (uint64_t)(now->variance - from->variance) * per_um2;
+  history->moving =
+      v2 > (uint32_t)(least * least) && (uint64_t)v2 * (uint32_t)spread > (uint64_t)(now->variance - from->variance) * per_um2;
   return true;
 }
 
@@ -302,8 +295,8 @@ static void judge(struct motion_history *history, uint64_t t_us) {
 }
 
 static bool starts_again(const struct motion_history *history, const struct contact_input *input) {
-  return history->brief.count > 0 && (input->fit->used != history->used || input->t_us <= history->newest_us ||
-                                      input->t_us - history->newest_us > MOTION_PAUSE_us);
+  return history->brief.count > 0 &&
+         (input->fit->used != history->used || input->t_us <= history->newest_us || input->t_us - history->newest_us > MOTION_PAUSE_us);
 }
 
 static void report(const struct motion_history *history, struct contact_result *result, struct motion *motion) {
@@ -315,8 +308,8 @@ static void report(const struct motion_history *history, struct contact_result *
   result->flags |= history->sliding ? (uint32_t)CONTACT_FLAG_SLIDING : 0;
 }
 
-void motion_update(struct motion_history *history, const struct tangential_settings *settings,
-                   const struct contact_input *input, struct contact_result *result, struct motion *motion) {
+void motion_update(struct motion_history *history, const struct tangential_settings *settings, const struct contact_input *input,
+                   struct contact_result *result, struct motion *motion) {
   const struct fit_tangential *found = input->tangential;
   memset(motion, 0, sizeof *motion);
   if (!input->contact || input->zero_doubtful) {

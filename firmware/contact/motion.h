@@ -28,8 +28,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Shortest span of the least squares, and fewest frames: at 410 frames a second, 0.3 mm/s of noise
- * where one location has 0.01 mm. */
+/* Shortest span of the least squares, and fewest frames: at 410 frames a second, 0.3 mm/s of noise where one location has 0.01 mm. */
 #define MOTION_VELOCITY_us 30000u
 #define MOTION_VELOCITY_FRAMES 3u
 /* MOVING begins and ends. */
@@ -107,7 +106,6 @@ struct motion_history {
 /* Forgets the past. */
 void motion_reset(struct motion_history *history);
 
-/* After tangential_update, of the same input: enters the location and adds VELOCITY_VALID, MOVING
- * and SLIDING to result->flags. */
-void motion_update(struct motion_history *history, const struct tangential_settings *settings,
-                   const struct contact_input *input, struct contact_result *result, struct motion *motion);
+/* After tangential_update, of the same input: enters the location and adds VELOCITY_VALID, MOVING and SLIDING to result->flags. */
+void motion_update(struct motion_history *history, const struct tangential_settings *settings, const struct contact_input *input,
+                   struct contact_result *result, struct motion *motion);

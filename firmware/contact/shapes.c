@@ -28,25 +28,21 @@ static float arc_tangent(float z) {
 /* Of (along_x, along_y), along_x >= 0. */
 static float direction_deg(float along_x, float along_y) {
   const float y = fabsf(along_y);
-  float angle_rad =
-      y <= along_x ? arc_tangent(along_x > 0.0f ? y / along_x : 0.0f) : 1.5707963f - arc_tangent(along_x / y);
+  float angle_rad = y <= along_x ? arc_tangent(along_x > 0.0f ? y / along_x : 0.0f) : 1.5707963f - arc_tangent(along_x / y);
   return DEGREES_PER_RAD * (along_y < 0.0f ? -angle_rad : angle_rad);
 }
 
-static struct shapes_contact contact_of(const struct shapes_question *question, const struct fit_shapes_result *result,
-                                        int c) {
+static struct shapes_contact contact_of(const struct shapes_question *question, const struct fit_shapes_result *result, int c) {
   return (struct shapes_contact){
       .x_mm = result->x_mm[c],
       .y_mm = result->y_mm[c],
       .location_sd_mm = result->location_sd_mm[c],
       .force_N = question->force_scale * result->force_N[c],
-      .force_sd_N =
-          fit_quadrature(question->force_scale, result->force_sd_N[c], question->force_scale_sd, result->force_N[c]),
+      .force_sd_N = fit_quadrature(question->force_scale, result->force_sd_N[c], question->force_scale_sd, result->force_N[c]),
   };
 }
 
-static void put_report(const struct shapes_question *question, const struct fit_shapes_result *result,
-                       struct shapes_report *report) {
+static void put_report(const struct shapes_question *question, const struct fit_shapes_result *result, struct shapes_report *report) {
   memset(report, 0, sizeof *report);
   report->shape = result->shape;
   report->t_us = question->t_us;
@@ -77,23 +73,22 @@ void shapes_estimate(void *job) {
   int parts = question->parts;
   bool goes_on;
   do {
-    own->progress = fit_shapes_part(own->array, &own->pad, question->pressure_Pa_q10, &question->settings,
-                                    &question->fit, &own->state, &own->result);
+    own->progress =
+        fit_shapes_part(own->array, &own->pad, question->pressure_Pa_q10, &question->settings, &question->fit, &own->state, &own->result);
     parts--;
     const bool knows = own->progress == FIT_SHAPES_ANSWERED && own->result.shape != FIT_SHAPE_UNDECIDED;
     /* What is begun is ended with the same readings, so the next one begins only if it ends here. */
     goes_on = own->progress == FIT_SHAPES_UNFINISHED ? parts > 0 : parts >= FIT_SHAPES_PARTS && !knows;
   } while (goes_on);
   /* A shape that is none of these is fitted from the beginning again, and stays so until it is known. */
-  const bool again = own->result.shape == FIT_SHAPE_UNDECIDED && !question->begins &&
-                     own->report.shape == FIT_SHAPE_NONE && own->state.frames > 0;
+  const bool again =
+      own->result.shape == FIT_SHAPE_UNDECIDED && !question->begins && own->report.shape == FIT_SHAPE_NONE && own->state.frames > 0;
   if (own->progress == FIT_SHAPES_ANSWERED && !again) {
     put_report(question, &own->result, &own->report);
   }
 }
 
-struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit,
-                                  const struct tangential_force *force) {
+struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit, const struct tangential_force *force) {
   struct shapes_place place = {fit->x_mm, fit->y_mm, fit->location_sd_mm};
   if (force) {
     place = (struct shapes_place){force->x_mm, force->y_mm, force->location_sd_mm};
@@ -112,15 +107,10 @@ struct shapes_place shapes_locate(const struct shapes_report *report, const stru
 uint32_t shapes_flags(const struct shapes_report *report) {
   switch (report->shape) {
   case FIT_SHAPE_ROUND:
-  case FIT_SHAPE_PULLED:
-    return CONTACT_FLAG_SHAPE_VALID;
-  case FIT_SHAPE_ELONGATED:
-    return CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE;
-  case FIT_SHAPE_TWO:
-    return CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS;
-  case FIT_SHAPE_NONE:
-    return CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_SHAPE_UNKNOWN;
-  default:
-    return 0;
+  case FIT_SHAPE_PULLED: return CONTACT_FLAG_SHAPE_VALID;
+  case FIT_SHAPE_ELONGATED: return CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE;
+  case FIT_SHAPE_TWO: return CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS;
+  case FIT_SHAPE_NONE: return CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_SHAPE_UNKNOWN;
+  default: return 0;
   }
 }

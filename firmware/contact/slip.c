@@ -37,8 +37,7 @@ static void append(struct slip_history *history, uint64_t t_us, int32_t x, int32
   history->count++;
 }
 
-bool slip_update(struct slip_history *history, uint64_t t_us, float x_mm, float y_mm, uint32_t window_us,
-                 float *distance_mm) {
+bool slip_update(struct slip_history *history, uint64_t t_us, float x_mm, float y_mm, uint32_t window_us, float *distance_mm) {
   int32_t x = (int32_t)(x_mm * SIXTEENTHS_PER_mm);
   int32_t y = (int32_t)(y_mm * SIXTEENTHS_PER_mm);
   bool full = false;

@@ -6,8 +6,7 @@
  * is the number of frames within the window, with half a frame interval granted for jitter. At 20 Hz a window of 100 ms
  * gives n = 2, the paper's setting. At constant speed v the distance is v (window + one interval) / 2.
  *
- * Positions are integers of 1/16 um, so the running sums are exact however long they run. The cost
- * does not grow with n. */
+ * Positions are integers of 1/16 um, so the running sums are exact however long they run. The cost does not grow with n. */
 #pragma once
 
 #include <stdbool.h>
@@ -31,5 +30,4 @@ void slip_reset(struct slip_history *history);
 
 /* Enters a location and gives its distance from the mean of those in the window before it. t_us must increase from call
  * to call; |x_mm|, |y_mm| <= 800. Returns false, with *distance_mm untouched, until the history spans the window. */
-bool slip_update(struct slip_history *history, uint64_t t_us, float x_mm, float y_mm, uint32_t window_us,
-                 float *distance_mm);
+bool slip_update(struct slip_history *history, uint64_t t_us, float x_mm, float y_mm, uint32_t window_us, float *distance_mm);

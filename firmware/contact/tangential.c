@@ -7,8 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile,
-                    const struct contact_settings *settings, bool calibrated) {
+void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile, const struct contact_settings *settings,
+                    bool calibrated) {
   /* A calibration's scale was found with 2 pi p0 sigma^2, of which the estimate's force is no
    * part; without one the estimate is the force itself, and as uncertain. */
   const float ratio = calibrated ? profile->force_ratio : 1.0f;
@@ -47,8 +47,8 @@ void tangential_estimate(void *job) {
   int steps = slow ? FIT_TANGENTIAL_FRAMES : 1;
   course->t_us = question->t_us;
   do {
-    fit_tangential_estimate(own->array, &own->pad, question->pressure_Pa_q10, question->settings, question->fit,
-                            &course->state, &own->estimate);
+    fit_tangential_estimate(own->array, &own->pad, question->pressure_Pa_q10, question->settings, question->fit, &course->state,
+                            &own->estimate);
   } while (!own->estimate.valid && --steps > 0);
 }
 
@@ -95,14 +95,11 @@ static int32_t ratio_q26(float tangential_N, int32_t force_N_q24, int32_t added_
   return fixed_div_q26(fixed_clamp(own_q26, -RATIO_MAX_Q26, RATIO_MAX_Q26), gain_q20 * 64);
 }
 
-/* pad_profile.h has the formulas. False: the tangential force shows too little of itself, or there is hardly a
- * force. */
-static bool without_edges(const struct tangential_settings *settings, const struct fit_tangential *found,
-                          struct fit_tangential *mended) {
+/* pad_profile.h has the formulas. False: the tangential force shows too little of itself, or there is hardly a force. */
+static bool without_edges(const struct tangential_settings *settings, const struct fit_tangential *found, struct fit_tangential *mended) {
   const int32_t least_q20 = (int32_t)(TANGENTIAL_GAIN_MIN * 1048576.0f);
   const int32_t x_q20 = fit_fixed(found->x_mm, 20), y_q20 = fit_fixed(found->y_mm, 20);
-  struct from_middle at = {fixed_mul_q30(x_q20 * 16, UNITS_PER_mm_Q32), fixed_mul_q30(y_q20 * 16, UNITS_PER_mm_Q32), 0,
-                           0};
+  struct from_middle at = {fixed_mul_q30(x_q20 * 16, UNITS_PER_mm_Q32), fixed_mul_q30(y_q20 * 16, UNITS_PER_mm_Q32), 0, 0};
   at.uu_q26 = fixed_mul_q26(at.u_q26, at.u_q26);
   at.vv_q26 = fixed_mul_q26(at.v_q26, at.v_q26);
   const int32_t gain_x = factor(settings, GAIN_X, &at), gain_y = factor(settings, GAIN_Y, &at);
@@ -111,14 +108,10 @@ static bool without_edges(const struct tangential_settings *settings, const stru
   if (gain_x < least_q20 || gain_y < least_q20 || force < least_q20 || force_N_q24 < FORCE_MIN_N_Q24) {
     return false;
   }
-  const int32_t ratio_x =
-      ratio_q26(found->qx_N, force_N_q24, fixed_mul_q26(at.u_q26, even(settings, RATIO_X, &at)), gain_x);
-  const int32_t ratio_y =
-      ratio_q26(found->qy_N, force_N_q24, fixed_mul_q26(at.v_q26, even(settings, RATIO_Y, &at)), gain_y);
-  const int32_t dx_q20 =
-      fixed_mul_q26(at.u_q26, even(settings, PLACE_X_mm, &at)) + fixed_mul_q26(ratio_x, even(settings, PULL_X_mm, &at));
-  const int32_t dy_q20 =
-      fixed_mul_q26(at.v_q26, even(settings, PLACE_Y_mm, &at)) + fixed_mul_q26(ratio_y, even(settings, PULL_Y_mm, &at));
+  const int32_t ratio_x = ratio_q26(found->qx_N, force_N_q24, fixed_mul_q26(at.u_q26, even(settings, RATIO_X, &at)), gain_x);
+  const int32_t ratio_y = ratio_q26(found->qy_N, force_N_q24, fixed_mul_q26(at.v_q26, even(settings, RATIO_Y, &at)), gain_y);
+  const int32_t dx_q20 = fixed_mul_q26(at.u_q26, even(settings, PLACE_X_mm, &at)) + fixed_mul_q26(ratio_x, even(settings, PULL_X_mm, &at));
+  const int32_t dy_q20 = fixed_mul_q26(at.v_q26, even(settings, PLACE_Y_mm, &at)) + fixed_mul_q26(ratio_y, even(settings, PULL_Y_mm, &at));
   const float per_force = inverse(force);
   *mended = *found;
   mended->x_mm = fit_float(x_q20 - dx_q20, -20);
@@ -140,9 +133,7 @@ NOINLINE static uint64_t packed_sum(uint64_t a, uint64_t b) {
 NOINLINE static uint64_t packed_quotient(uint64_t a, uint64_t b) {
   return scaled_pack(scaled_div(short_of(scaled_unpack(a)), short_of(scaled_unpack(b))));
 }
-FIXED_INLINE struct scaled sum_of(struct scaled a, struct scaled b) {
-  return scaled_unpack(packed_sum(scaled_pack(a), scaled_pack(b)));
-}
+FIXED_INLINE struct scaled sum_of(struct scaled a, struct scaled b) { return scaled_unpack(packed_sum(scaled_pack(a), scaled_pack(b))); }
 FIXED_INLINE struct scaled quotient_of(struct scaled a, struct scaled b) {
   return scaled_unpack(packed_quotient(scaled_pack(a), scaled_pack(b)));
 }
@@ -231,9 +222,8 @@ static bool settle_zero(struct tangential_history *history, uint64_t t_us, float
   return history->settled;
 }
 
-void tangential_update(struct tangential_history *history, const struct tangential_settings *settings,
-                       const struct contact_input *input, struct contact_result *result,
-                       struct tangential_force *force) {
+void tangential_update(struct tangential_history *history, const struct tangential_settings *settings, const struct contact_input *input,
+                       struct contact_result *result, struct tangential_force *force) {
   struct fit_tangential mended;
   const struct fit_tangential *found = &mended;
   memset(force, 0, sizeof *force);
@@ -261,8 +251,7 @@ void tangential_update(struct tangential_history *history, const struct tangenti
   force->y_mm = found->y_mm;
   force->location_sd_mm = found->location_sd_mm;
   force->force_N = settings->force_scale * found->force_N;
-  force->force_sd_N =
-      fit_quadrature(settings->force_scale, found->force_sd_N, settings->force_scale_sd, found->force_N);
+  force->force_sd_N = fit_quadrature(settings->force_scale, found->force_sd_N, settings->force_scale_sd, found->force_N);
   force->qx_N = scale * qx_N;
   force->qy_N = scale * qy_N;
   force->q_sd_N = fit_quadrature(scale, found->q_sd_N, scale_sd, size_N);

@@ -18,10 +18,9 @@ struct tangential_settings {
   float location_sd_limit_mm;                        /* UNCERTAIN above it */
 };
 
-/* The scales of this profile, with the calibration whose scales are in settings or, if it is not
- * calibrated, without one. */
-void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile,
-                    const struct contact_settings *settings, bool calibrated);
+/* The scales of this profile, with the calibration whose scales are in settings or, if it is not calibrated, without one. */
+void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile, const struct contact_settings *settings,
+                    bool calibrated);
 
 /* The tangential force at the beginning of a contact counts as zero: the mean of Q / F over this time after its
  * first estimate. Long enough for the mean of a hundred frames, short before any lift. */
@@ -36,11 +35,10 @@ struct tangential_history {
   float zero_x, zero_y; /* Q / F */
 };
 
-/* All zeros unless TANGENTIAL_VALID. The place is the mean of that of a contact that is pulled as
- * estimated and of one that nothing pulls, each by how likely it is: a small tangential force may be none, and
- * chance tangential forces would move it. location_sd_mm has what lies between the two. The tangential force itself is
- * reported as estimated, however small: its mean is right, and who controls by it has q_sd_N. Pictures draw one from
- * two standard deviations on. */
+/* All zeros unless TANGENTIAL_VALID. The place is the mean of that of a contact that is pulled as estimated and of one that nothing pulls,
+ * each by how likely it is: a small tangential force may be none, and chance tangential forces would move it. location_sd_mm has what lies
+ * between the two. The tangential force itself is reported as estimated, however small: its mean is right, and who controls by it has
+ * q_sd_N. Pictures draw one from two standard deviations on. */
 struct tangential_force {
   float x_mm, y_mm, location_sd_mm;
   float force_N, force_sd_N;
@@ -88,18 +86,15 @@ struct tangential_job {
 #define TANGENTIAL_LATE_us 450u
 #define TANGENTIAL_SLOW_LATE_us 2250u
 
-/* Answers the question of a struct tangential_job. Where the fit is not worthwhile there is no
- * estimate, and the course starts again. */
+/* Answers the question of a struct tangential_job. Where the fit is not worthwhile there is no estimate, and the course starts again. */
 void tangential_estimate(void *job);
 
 /* Forgets the contact. */
 void tangential_reset(struct tangential_history *history);
 
-/* Call after contact_judge or contact_update, with the same input. Adds TANGENTIAL_VALID and TANGENTIAL_FROM_TOUCH to
- * result->flags. With the former, UNCERTAIN is about the corrected location, and ELONGATED about the estimate, which a
- * tangential force does not make look long. Where the pad's edges hide a tangential force such that it shows less than
- * TANGENTIAL_GAIN_MIN of itself, there is none. */
+/* Call after contact_judge or contact_update, with the same input. Adds TANGENTIAL_VALID and TANGENTIAL_FROM_TOUCH to result->flags. With
+ * the former, UNCERTAIN is about the corrected location, and ELONGATED about the estimate, which a tangential force does not make look
+ * long. Where the pad's edges hide a tangential force such that it shows less than TANGENTIAL_GAIN_MIN of itself, there is none. */
 #define TANGENTIAL_GAIN_MIN 0.25f
-void tangential_update(struct tangential_history *history, const struct tangential_settings *settings,
-                       const struct contact_input *input, struct contact_result *result,
-                       struct tangential_force *force);
+void tangential_update(struct tangential_history *history, const struct tangential_settings *settings, const struct contact_input *input,
+                       struct contact_result *result, struct tangential_force *force);

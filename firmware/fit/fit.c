@@ -5,9 +5,7 @@
 
 #include <stdbool.h>
 
-static uint32_t all_sensors(const struct fit_array *array) {
-  return UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
-}
+static uint32_t all_sensors(const struct fit_array *array) { return UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count); }
 
 /* The faster kernel, or that for missing sensors. Returns whether the residuals suggest an outlier. */
 FIXED_INLINE bool fit_rectangle(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
@@ -20,8 +18,7 @@ FIXED_INLINE bool fit_rectangle(const struct fit_array *array, const int32_t *pr
 
 /* Fits once more without the outlier, if there is one. */
 static void leave_outlier_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                              const struct fit_settings *settings, struct fit_result *without,
-                              struct fit_result *result) {
+                              const struct fit_settings *settings, struct fit_result *without, struct fit_result *result) {
   int outlier = fit_grid_outlier(array, pressure_Pa_q10, usable, settings, result);
   if (outlier < 0) {
     return;
@@ -88,8 +85,8 @@ void fit_gaussian_grid_small(const struct fit_array *array, const int32_t *press
   fit_grid_masked(array, pressure_Pa_q10, usable & all_sensors(array), settings, result);
 }
 
-void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                       const struct fit_settings *settings, struct fit_result *result) {
+void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+                       struct fit_result *result) {
   struct fit_watch none;
   none.usable = none.frames = 0;
   fit_gaussian_grid_follow(array, pressure_Pa_q10, usable, settings, &none, result);
@@ -104,8 +101,8 @@ void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_
   }
 }
 
-void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                  const struct fit_settings *settings, struct fit_result *result) {
+void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+                  struct fit_result *result) {
   struct fit_watch none;
   none.usable = none.frames = 0;
   fit_gaussian_follow(array, pressure_Pa_q10, usable, settings, &none, result);

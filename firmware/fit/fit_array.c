@@ -105,8 +105,7 @@ static void find_line(struct fit_array *made) {
 }
 
 /* Everything but the line. */
-static enum ft_status make_array(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
-                                 float pitch_mm) {
+static enum ft_status make_array(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm, float pitch_mm) {
   if (sensor_count < 1 || sensor_count > FT_MAX_SENSORS || !(pitch_mm >= 0.01f && pitch_mm <= POSITION_MAX_mm)) {
     return FT_ERR_ARGUMENT;
   }
@@ -129,8 +128,7 @@ static enum ft_status make_array(struct fit_array *array, uint8_t sensor_count, 
   return FT_OK;
 }
 
-enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
-                              float pitch_mm) {
+enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm, float pitch_mm) {
   enum ft_status status = make_array(array, sensor_count, x_mm, y_mm, pitch_mm);
   if (status == FT_OK) {
     find_line(array);
@@ -138,8 +136,7 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
   return status;
 }
 
-enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm,
-                                   float pitch_mm) {
+enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm, float pitch_mm) {
   enum ft_status status = make_array(array, sensor_count, x_mm, y_mm, pitch_mm);
   return status == FT_OK && !fit_is_rectangle(array) ? FT_ERR_ARGUMENT : status;
 }

@@ -8,8 +8,7 @@
 
 #include <string.h>
 
-/* The model of the residual, lengths in sigma, parts of p0, d = (dx, dy) from the contact to the
- * sensor, g(v) = exp(-d' d / (2 v)):
+/* The model of the residual, lengths in sigma, parts of p0, d = (dx, dy) from the contact to the sensor, g(v) = exp(-d' d / (2 v)):
  *   residual = g(1) (a + b dx + c dy + e d' d) + far g(FAR) + (qx dx + qy dy) g(PULL)
  * The first four are what a step of the fit would still take. `far` is 0 +- FAR_SD of p0: what the
  * rubber has around a contact, or what a known dip is off by. The last two are the trace of a tangential force. */
@@ -22,8 +21,7 @@ _Static_assert(UNKNOWNS == FIT_DOUBT_UNKNOWNS, "the look's room is for them");
 /* Of the model's own error, MODEL_SHARE_SHIFT: a half of model_sd is independent from sensor to
  * sensor. The other unknowns take the rest. */
 #define MODEL_SHARE_SHIFT 1
-/* A trace is one whose square exceeds SURE times the sum of its two variances, which chance
- * makes in one press of seven. */
+/* A trace is one whose square exceeds SURE times the sum of its two variances, which chance makes in one press of seven. */
 #define SURE 2
 
 /* How far the location moves for each unit of Q / F, the longer of two, and the trace's coefficient
@@ -46,8 +44,7 @@ _Static_assert(UNKNOWNS == FIT_DOUBT_UNKNOWNS, "the look's room is for them");
 #define Z_MAX_Q22 (1u << 27)      /* 6.7 sigma away */
 #define OWN_MAX_Q12 ((int32_t)(FIT_OWN_SHARE_MAX * 4096.0f))
 
-static void set_dip(const struct fit_settings *settings, const struct fit_result *result,
-                    struct fit_doubt_search *look) {
+static void set_dip(const struct fit_settings *settings, const struct fit_result *result, struct fit_doubt_search *look) {
   look->dip_q18 = look->dip_per_q26 = 0;
   if (fit_has_dip(settings)) {
     struct scaled ratio = scaled_div(fit_grid_scaled(result->sigma_mm), fit_grid_scaled(settings->dip_sd_mm));
@@ -57,8 +54,7 @@ static void set_dip(const struct fit_settings *settings, const struct fit_result
 }
 
 /* 2^shift: the readings' unit, 1/1024 Pa. */
-static void set_base(const struct fit_settings *settings, int32_t largest, int32_t shift,
-                     struct fit_doubt_search *look) {
+static void set_base(const struct fit_settings *settings, int32_t largest, int32_t shift, struct fit_doubt_search *look) {
   int32_t noise_q4 = fixed_clamp(shifted(settings->noise_Pa_q10, 4 - shift), 1, ERROR_MAX_Q4);
   int32_t model_q4 = (int32_t)((settings->model_sd_q16 * (uint32_t)shifted(largest, -shift)) >> 12);
   look->base_q4 = fixed_clamp(fixed_longer_leg(noise_q4, model_q4 >> MODEL_SHARE_SHIFT), 1, ERROR_MAX_Q4);
@@ -75,9 +71,8 @@ FIXED_INLINE int32_t in_sigmas(float at, int32_t from_q16, int32_t per_sigma_q12
 enum { AT_X_Q12, AT_Y_Q12, READING_Q18, OWN_Q4, OFF_X_Q12, OFF_Y_Q12, WIDER_Q15 };
 
 /* False: there is nothing to be seen in so few or such readings. */
-static bool take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                          const struct fit_settings *settings, const struct fit_result *result,
-                          struct fit_doubt_search *look) {
+static bool take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+                          const struct fit_result *result, struct fit_doubt_search *look) {
   int32_t largest = 0;
   int count = 0;
   for (int k = 0; k < array->sensor_count; k++) {
@@ -190,12 +185,12 @@ static NOINLINE void put_products(int a, const int32_t *sums, struct fit_doubt_s
 }
 
 _Static_assert(UNKNOWNS == 7, "every pair is in one of these");
-#define TAKE_PRODUCTS(a)                                                                                               \
-  static NOINLINE void take_products_##a(struct fit_doubt_search *look) {                                              \
-    int32_t sums[4];                                                                                                   \
-    const int32_t *row = look->row[0];                                                                                 \
-    fixed_sum_products(row, row + look->count * WORDS, sums, WORDS, (a), ((a) + 1) % 7, ((a) + 2) % 7, ((a) + 3) % 7); \
-    put_products((a), sums, look);                                                                                     \
+#define TAKE_PRODUCTS(a)                                                                                                                   \
+  static NOINLINE void take_products_##a(struct fit_doubt_search *look) {                                                                  \
+    int32_t sums[4];                                                                                                                       \
+    const int32_t *row = look->row[0];                                                                                                     \
+    fixed_sum_products(row, row + look->count * WORDS, sums, WORDS, (a), ((a) + 1) % 7, ((a) + 2) % 7, ((a) + 3) % 7);                     \
+    put_products((a), sums, look);                                                                                                         \
   }
 TAKE_PRODUCTS(0)
 TAKE_PRODUCTS(1)
@@ -259,8 +254,7 @@ static NOINLINE struct scaled trace_of(struct fit_doubt_search *look) {
   struct scaled variance = scaled_mul(look->base, look->base);
   /* Residuals that the model does not explain count as errors of the readings. */
   int32_t freedom = look->count - UNKNOWNS;
-  struct scaled found =
-      fit_scaled_from(port_divide(left > 0 ? left : 0, freedom < 1 ? 1 : freedom), -2 * look->q[RESIDUAL]);
+  struct scaled found = fit_scaled_from(port_divide(left > 0 ? left : 0, freedom < 1 ? 1 : freedom), -2 * look->q[RESIDUAL]);
   variance = scaled_sub(found, variance).mantissa > 0 ? found : variance;
   struct scaled by_chance = scaled_mul(fit_scaled_short(variance), scaled_add(form_x, per_y));
   by_chance = fit_scaled_short(by_chance);
@@ -304,21 +298,12 @@ void fit_doubt_follow(struct fit_doubt *doubt, const struct fit_array *array, co
       return;
     }
     break;
-  case 1:
-    set_rows(look, 0, look->count / 2);
-    break;
-  case 2:
-    set_rows(look, look->count / 2, look->count);
-    break;
-  case 3:
-    scale_columns(look);
-    break;
-  case 4:
-    take_products(look);
-    break;
+  case 1: set_rows(look, 0, look->count / 2); break;
+  case 2: set_rows(look, look->count / 2, look->count); break;
+  case 3: scale_columns(look); break;
+  case 4: take_products(look); break;
   default: {
-    struct scaled ratio =
-        scaled_mul(fit_scaled_sqrt(fit_scaled_short(trace_of(look))), fit_grid_scaled(RATIO_PER_TRACE));
+    struct scaled ratio = scaled_mul(fit_scaled_sqrt(fit_scaled_short(trace_of(look))), fit_grid_scaled(RATIO_PER_TRACE));
     doubt->ratio = fit_scaled_float(ratio);
     doubt->known = true;
   }

@@ -12,8 +12,7 @@
 #include "fit/fit.h"
 #include "fit/fit_fixed.h"
 
-/* With fewer sensors the residual shows nothing. With more than 24 there is no look, unless they are
- * a rectangle that the build knows. */
+/* With fewer sensors the residual shows nothing. With more than 24 there is no look, unless they are a rectangle that the build knows. */
 #define FIT_DOUBT_SENSORS 8
 #define FIT_DOUBT_SENSORS_MAX (FIT_GRID_MOST_NODES > 24 ? FT_MAX_SENSORS : 24)
 

@@ -56,9 +56,7 @@ FIXED_INLINE int32_t fixed_mul_near_q28(int32_t a, int32_t b) {
 }
 
 /* a * b / 2^16 for any a and |b| < 2^15; an int32_t for any b. */
-FIXED_INLINE int32_t fixed_mul_16(int32_t a, int32_t b) {
-  return fixed_plus(fixed_times(a >> 16, b), fixed_times((uint16_t)a, b) >> 16);
-}
+FIXED_INLINE int32_t fixed_mul_16(int32_t a, int32_t b) { return fixed_plus(fixed_times(a >> 16, b), fixed_times((uint16_t)a, b) >> 16); }
 
 /* Position of the highest set bit plus one; 0 for 0. */
 FIXED_INLINE int32_t fixed_bits(uint32_t value) {
@@ -77,9 +75,7 @@ FIXED_INLINE int32_t fixed_bits(uint32_t value) {
 /* |value| without its last unit for negative ones: good for judging sizes. */
 FIXED_INLINE uint32_t fixed_size(int32_t value) { return (uint32_t)(value ^ (value >> 31)); }
 
-FIXED_INLINE int32_t fixed_clamp(int32_t value, int32_t low, int32_t high) {
-  return value < low ? low : value > high ? high : value;
-}
+FIXED_INLINE int32_t fixed_clamp(int32_t value, int32_t low, int32_t high) { return value < low ? low : value > high ? high : value; }
 
 /* sqrt(a^2 + b^2) within 7 %, for weights. */
 FIXED_INLINE int32_t fixed_longer_leg(int32_t a, int32_t b) {
@@ -89,8 +85,7 @@ FIXED_INLINE int32_t fixed_longer_leg(int32_t a, int32_t b) {
 
 /* The products of element a of each row of `words` with elements b, c, d and the last, summed: four
  * in as many registers as a Cortex-M0+ has for them. */
-FIXED_INLINE void fixed_sum_products(const int32_t *row, const int32_t *end, int32_t *sums, int words, int a, int b,
-                                     int c, int d) {
+FIXED_INLINE void fixed_sum_products(const int32_t *row, const int32_t *end, int32_t *sums, int words, int a, int b, int c, int d) {
   int32_t ab = 0, ac = 0, ad = 0, al = 0;
   do {
     int32_t own = row[a];
@@ -118,8 +113,7 @@ struct fixed_pivot {
 /* Takes from the unknowns after j what j explains: L D L^T with a power of two between the factors, of 16 bits each.
  * matrix: the lower half, rows of `words`; column j and right[j] stay as they are. over: the elements of L below j,
  * Q14. What j explains of the square of the residual is own over 2. */
-FIXED_INLINE struct fixed_pivot fixed_eliminate(int32_t *matrix, int words, int count, int j, int32_t *right,
-                                                int32_t *over) {
+FIXED_INLINE struct fixed_pivot fixed_eliminate(int32_t *matrix, int words, int count, int j, int32_t *right, int32_t *over) {
   struct fixed_pivot pivot = {0, 0, 0, 0};
   int32_t element = matrix[j * words + j];
   if (element < FIXED_PIVOT_LEAST) {
@@ -162,9 +156,7 @@ struct scaled {
 };
 
 /* A struct of two words is returned in memory, 64 bits are in registers. */
-FIXED_INLINE uint64_t scaled_pack(struct scaled a) {
-  return (uint64_t)(uint32_t)a.exponent << 32 | (uint32_t)a.mantissa;
-}
+FIXED_INLINE uint64_t scaled_pack(struct scaled a) { return (uint64_t)(uint32_t)a.exponent << 32 | (uint32_t)a.mantissa; }
 FIXED_INLINE struct scaled scaled_unpack(uint64_t packed) {
   return (struct scaled){(int32_t)(uint32_t)packed, (int32_t)(uint32_t)(packed >> 32)};
 }
@@ -176,9 +168,7 @@ FIXED_INLINE struct scaled scaled_from(int32_t value, int32_t exponent) {
 }
 
 /* A value up to 2^30 of which 15 bits are enough although it may be smaller. */
-FIXED_INLINE struct scaled scaled_near(int32_t value, int32_t exponent) {
-  return (struct scaled){value >> 15, exponent + 15};
-}
+FIXED_INLINE struct scaled scaled_near(int32_t value, int32_t exponent) { return (struct scaled){value >> 15, exponent + 15}; }
 
 /* The product of two normalised mantissas keeps 14 of its 15 bits at least. */
 FIXED_INLINE struct scaled scaled_mul(struct scaled a, struct scaled b) {

@@ -1,10 +1,9 @@
 /* How far the gains of a pad's sensors are apart, learnt from touches: of a pad that was never calibrated it is not
  * known, and what four fitted parameters leave of their errors is in the residual of each touch. So
  *   gain_sd^2 = sum(R / M) / sum(0.58 (sigma / pitch)^3),
- * R and M the squares of the touch's residual, less those of the model's error, and of the fitted
- * Gaussian. The denominator is the share of independent relative errors that the fit leaves, within
- * 25 % for rectangles of 3 x 3 to 5 x 5 sensors and widths of 0.55 to 1 pitch. Gains on a tilt or a
- * bowl leave nothing in the residual, so it is never below 0.08 (NUMERICS.md has what it is worth).
+ * R and M the squares of the touch's residual, less those of the model's error, and of the fitted Gaussian. The denominator is the share of
+ * independent relative errors that the fit leaves, within 25 % for rectangles of 3 x 3 to 5 x 5 sensors and widths of 0.55 to 1 pitch.
+ * Gains on a tilt or a bowl leave nothing in the residual, so it is never below 0.08 (NUMERICS.md has what it is worth).
  *
  * A touch counts once, when it rests. What was assumed counts as much as FIT_GAINS_TOUCHES of them. */
 #pragma once

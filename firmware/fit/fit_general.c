@@ -191,8 +191,8 @@ static float model_row(const struct dip *dip, float sigma, float x, float y, flo
 
 /* Gives theta the best amplitude for its shape, p0 entering linearly, and sets up the normal
  * equations of the model linearised there. Returns the sum of squared residuals. */
-static float linearise(const struct fit_array *array, const struct samples *samples, struct prior prior,
-                       const struct dip *dip, struct parameters *theta, struct normal_equations *normal) {
+static float linearise(const struct fit_array *array, const struct samples *samples, struct prior prior, const struct dip *dip,
+                       struct parameters *theta, struct normal_equations *normal) {
   memset(normal, 0, sizeof *normal);
   float row[FT_MAX_SENSORS][PARAMETERS];
   float numerator = 0.0f;
@@ -305,8 +305,7 @@ static float product(const float a[PARAMETERS], const float b[PARAMETERS]) {
 }
 
 /* Leaves matrix^-1 direction, scaled, in `influence`, and returns the quadratic form. */
-static float influence_along(const struct normal_equations *normal, const float *direction, float scale,
-                             float *influence) {
+static float influence_along(const struct normal_equations *normal, const float *direction, float scale, float *influence) {
   for (int i = 0; i < PARAMETERS; i++) {
     influence[i] = direction[i];
   }
@@ -318,8 +317,8 @@ static float influence_along(const struct normal_equations *normal, const float 
   return form;
 }
 
-static void set_influence(const struct fit_array *array, const struct parameters *at,
-                          const struct normal_equations *normal, struct influence *influence) {
+static void set_influence(const struct fit_array *array, const struct parameters *at, const struct normal_equations *normal,
+                          struct influence *influence) {
   float gain = at->sigma * at->sigma / at->p0;
   influence->gain = gain;
   const float along_force[PARAMETERS] = {1.0f, 0.0f, 0.0f, 2.0f * at->sigma * at->sigma};
@@ -331,8 +330,7 @@ static void set_influence(const struct fit_array *array, const struct parameters
     along_x[2] = array->line_x;
     along_y[2] = 0.0f;
   }
-  influence->location_form =
-      influence_along(normal, along_x, gain, influence->x) + influence_along(normal, along_y, gain, influence->y);
+  influence->location_form = influence_along(normal, along_x, gain, influence->x) + influence_along(normal, along_y, gain, influence->y);
 }
 
 /* Variances that the sensors' own errors make; fit_limits.h has the errors. */
@@ -341,9 +339,8 @@ struct own_errors {
   float location, force; /* pitches squared, and share squared */
 };
 
-static void add_own_errors(const struct samples *samples, const struct fit_settings *settings, float scale,
-                           const struct dip *dip, const struct parameters *at, const struct influence *influence,
-                           struct own_errors *own) {
+static void add_own_errors(const struct samples *samples, const struct fit_settings *settings, float scale, const struct dip *dip,
+                           const struct parameters *at, const struct influence *influence, struct own_errors *own) {
   float inverse = 1.0f / (at->sigma * at->sigma);
   float shape_x = 0.0f, shape_y = 0.0f, shape_force = 0.0f;
   own->gains = own->location = own->force = 0.0f;
@@ -514,11 +511,9 @@ static uint32_t flags_of(const struct problem *problem, const struct solution *s
   return flags;
 }
 
-/* Sets the standard deviations, from the last linearisation: a variance of the readings that is the same for all
- * of them, and what their own errors make of the result; that of the prior is its own. Returns whether noise,
- * gains and model do not explain the residuals. */
-static bool set_errors(const struct problem *problem, const struct solution *solution, uint32_t flags,
-                       struct fit_result *result) {
+/* Sets the standard deviations, from the last linearisation: a variance of the readings that is the same for all of them, and what their
+ * own errors make of the result; that of the prior is its own. Returns whether noise, gains and model do not explain the residuals. */
+static bool set_errors(const struct problem *problem, const struct solution *solution, uint32_t flags, struct fit_result *result) {
   const struct fit_settings *settings = problem->settings;
   const struct parameters *before = &solution->before;
   const int count = problem->samples.count;
@@ -559,8 +554,8 @@ static bool set_errors(const struct problem *problem, const struct solution *sol
 
 /* Whether the fit has settled with residuals that are rough and no noise; then outlier is the
  * sensor that does not belong to the others, or -1. */
-static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                     const struct fit_settings *settings, struct fit_result *result, int *outlier) {
+static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+                     struct fit_result *result, int *outlier) {
   memset(result, 0, sizeof *result);
   *outlier = -1;
   uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
@@ -598,14 +593,13 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
     return false;
   }
   if (problem.samples.count > problem.unknowns + 1) {
-    *outlier = outlier_of(&problem.samples, &problem.dip, &solution.before, &solution.normal, solution.squares,
-                          problem.unknowns);
+    *outlier = outlier_of(&problem.samples, &problem.dip, &solution.before, &solution.normal, solution.squares, problem.unknowns);
   }
   return true;
 }
 
-void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                 const struct fit_settings *settings, struct fit_result *result) {
+void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+                 struct fit_result *result) {
   int outlier;
   fit_once(array, pressure_Pa_q10, usable, settings, result, &outlier);
   if (outlier < 0) {

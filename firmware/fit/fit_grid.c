@@ -1,5 +1,4 @@
-/* Gauss-Newton without a matrix to solve. On a full rectangle the model is a product e = gx gy, and
- * its derivatives span
+/* Gauss-Newton without a matrix to solve. On a full rectangle the model is a product e = gx gy, and its derivatives span
  *   e, e p1(x), e q1(y), e (p2(x) + q2(y))
  * with p and q the polynomials of degree 1 and 2 that are orthogonal over the nodes under gx^2 and gy^2. So the normal
  * matrix is diagonal, and a direction that the data hardly determine is a small element with its full relative
@@ -33,8 +32,7 @@
 #define GUESS_HEIGHT_MIN_Q26 1936353
 #define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
 
-/* FIT_STRETCH_LEAST^2, FIT_STRETCH_SURE^2, FIT_STRETCH_SD_MAX^2, FIT_STRETCH_LINEAR^2, and the
- * height of FIT_SHAPE_LEAST. */
+/* FIT_STRETCH_LEAST^2, FIT_STRETCH_SURE^2, FIT_STRETCH_SD_MAX^2, FIT_STRETCH_LINEAR^2, and the height of FIT_SHAPE_LEAST. */
 #define ROUND_SQUARE ((struct scaled){20972, -21})
 #define SURE_SQUARE ((struct scaled){25600, -12})
 #define KNOWN_SQUARE ((struct scaled){16384, -18})
@@ -86,8 +84,7 @@ FIXED_INLINE void vector_shift(const int32_t *from, int32_t *to, int count, int3
   UNROLL for (int i = 0; i < count; i++) { to[i] = (from[i] + half) >> shift; }
 }
 
-/* The shift that brings a size to this many bits; what is smaller stays as it is, since there is
- * nothing below its last bit. */
+/* The shift that brings a size to this many bits; what is smaller stays as it is, since there is nothing below its last bit. */
 FIXED_INLINE int32_t shift_to(int32_t bits, uint32_t size) {
   int32_t shift = fixed_bits(size) - bits;
   return shift > 0 ? shift : 0;
@@ -188,8 +185,7 @@ static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_
   return shift;
 }
 
-/* The sums of the values against the basis. Each part of it is g along one of the axes at least, so
- * sums over rows and columns do. */
+/* The sums of the values against the basis. Each part of it is g along one of the axes at least, so sums over rows and columns do. */
 static NOINLINE void project(struct moments *m, const int32_t *values, int32_t shift, struct fit_system *system) {
   const struct factor *x = &m->x, *y = &m->y;
   int32_t over_y[MOST_COLUMNS] = {0};
@@ -239,8 +235,7 @@ FIXED_INLINE void evaluate(struct readings *readings, bool coarse, struct moment
   int32_t mass_x = m->x.mass_q26 >> 14, mass_y = m->y.mass_q26 >> 14;
   system->d1 = (struct scaled){(m->x.linear_norm >> 14) * mass_y, 5 - 2 * m->x.linear_q};
   system->d2 = (struct scaled){(m->y.linear_norm >> 14) * mass_x, 5 - 2 * m->y.linear_q};
-  system->d3 =
-      (struct scaled){(m->x.square_norm >> 15) * mass_y + (m->y.square_norm >> 15) * mass_x, 6 - 2 * m->square_q};
+  system->d3 = (struct scaled){(m->x.square_norm >> 15) * mass_y + (m->y.square_norm >> 15) * mass_x, 6 - 2 * m->square_q};
   fit_grid_complete(readings, system);
 }
 
@@ -268,9 +263,9 @@ static NOINLINE void finish(const struct readings *readings, const struct moment
  * the same for a contact turned by 45 degrees; together they are the logarithm of the longer width over the shorter. */
 struct shape {
   struct scaled wider_x, wider_y, stretch, slant; /* wider: log of sigma_x / sigma, sigma_y / sigma */
-  struct scaled noise_form;   /* by which the readings' variance gives that of (length of both)^2 / 2 */
-  int32_t x, y, xy, exponent; /* how one unit of each column moves that square, halved */
-  uint32_t by_gains;          /* sum over the sensors, as in struct fit_spread */
+  struct scaled noise_form;                       /* by which the readings' variance gives that of (length of both)^2 / 2 */
+  int32_t x, y, xy, exponent;                     /* how one unit of each column moves that square, halved */
+  uint32_t by_gains;                              /* sum over the sensors, as in struct fit_spread */
 };
 
 /* The sum of the residual against e p1(x) q1(y). */
@@ -286,16 +281,15 @@ static struct scaled project_slant(const struct moments *m, const struct reading
   return fit_scaled_from(sum, 17 + residual_shift - 28 - m->x.linear_q - m->y.linear_q);
 }
 
-static NOINLINE void begin_shape(const struct readings *readings, const struct moments *m,
-                                 const struct fit_system *system, const struct fit_spread *spread,
-                                 struct shape *shape) {
+static NOINLINE void begin_shape(const struct readings *readings, const struct moments *m, const struct fit_system *system,
+                                 const struct fit_spread *spread, struct shape *shape) {
   const struct factor *x = &m->x, *y = &m->y;
   struct scaled mass_x = fit_scaled_from(x->mass_q26, -26), mass_y = fit_scaled_from(y->mass_q26, -26);
   int32_t norm_q = 3 - 2 * m->square_q;
   struct scaled inverse_x = fit_grid_reciprocal(scaled_mul(fit_scaled_from(x->square_norm, norm_q), mass_y));
   struct scaled inverse_y = fit_grid_reciprocal(scaled_mul(fit_scaled_from(y->square_norm, norm_q), mass_x));
-  struct scaled inverse_xy = fit_grid_reciprocal(scaled_mul(fit_scaled_from(x->linear_norm, 3 - 2 * x->linear_q),
-                                                            fit_scaled_from(y->linear_norm, 3 - 2 * y->linear_q)));
+  struct scaled inverse_xy = fit_grid_reciprocal(
+      scaled_mul(fit_scaled_from(x->linear_norm, 3 - 2 * x->linear_q), fit_scaled_from(y->linear_norm, 3 - 2 * y->linear_q)));
   struct scaled softness = spread->softness;
   int32_t q = system->residual_shift - 26 - m->square_q;
   struct scaled along_x = scaled_mul(inverse_x, softness);
@@ -306,11 +300,9 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
   shape->stretch = fit_scaled_short(scaled_sub(shape->wider_x, shape->wider_y));
   shape->slant = scaled_mul(project_slant(m, readings, system->residual_shift), along_xy);
 
-  struct scaled values[3] = {scaled_mul(shape->stretch, along_x), scaled_mul(shape->stretch, along_y),
-                             scaled_mul(shape->slant, along_xy)};
-  shape->noise_form =
-      scaled_add(scaled_add(scaled_mul(values[0], shape->stretch), scaled_mul(values[1], shape->stretch)),
-                 scaled_mul(values[2], shape->slant));
+  struct scaled values[3] = {scaled_mul(shape->stretch, along_x), scaled_mul(shape->stretch, along_y), scaled_mul(shape->slant, along_xy)};
+  shape->noise_form = scaled_add(scaled_add(scaled_mul(values[0], shape->stretch), scaled_mul(values[1], shape->stretch)),
+                                 scaled_mul(values[2], shape->slant));
   shape->noise_form = scaled_mul(shape->noise_form, softness);
   values[0].exponent -= m->square_q;
   values[1].exponent -= m->square_q;
@@ -323,9 +315,7 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
 }
 
 /* cosh(v) and sinh(v) / v from v^2, Q13, for v^2 up to FIT_STRETCH_MAX^2: error below 1 %. */
-FIXED_INLINE int32_t cosh_q13(int32_t square_q13) {
-  return 8192 + (square_q13 >> 1) + port_divide((square_q13 * square_q13) >> 13, 24);
-}
+FIXED_INLINE int32_t cosh_q13(int32_t square_q13) { return 8192 + (square_q13 >> 1) + port_divide((square_q13 * square_q13) >> 13, 24); }
 FIXED_INLINE int32_t sinh_ratio_q13(int32_t square_q13) {
   return 8192 + port_divide(square_q13, 6) + port_divide((square_q13 * square_q13) >> 13, 120);
 }
@@ -368,8 +358,8 @@ struct moves {
 };
 
 /* As fit_grid_add_moves, without the room for the moves. */
-static NOINLINE void add_moves(const struct moments *m, const struct moves *moves, const struct readings *room,
-                               uint32_t *by_gains, int32_t *by_shape) {
+static NOINLINE void add_moves(const struct moments *m, const struct moves *moves, const struct readings *room, uint32_t *by_gains,
+                               int32_t *by_shape) {
   const int32_t *errors = room->q14, *shapes = room->residual;
   uint32_t squares = *by_gains;
   int32_t sum = 0;
@@ -387,8 +377,7 @@ static NOINLINE void add_moves(const struct moments *m, const struct moves *move
 }
 
 /* The same for the shape's two columns, of the gains alone. */
-static NOINLINE void add_shape_moves(const struct moments *m, const struct moves *moves, const struct readings *room,
-                                     struct shape *shape) {
+static NOINLINE void add_shape_moves(const struct moments *m, const struct moves *moves, const struct readings *room, struct shape *shape) {
   const int32_t *errors = room->q14;
   uint32_t squares = 0;
   for (int i = 0; i < COLUMNS; i++) {
@@ -431,9 +420,8 @@ FIXED_INLINE void set_parts(const struct factor *f, int nodes, int32_t linear, i
 }
 
 /* What errors of single sensors make of the result. */
-static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings,
-                                   const struct moments *m, const struct fit_system *system, struct readings *room,
-                                   struct fit_spread *spread, struct shape *shape) {
+static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings, const struct moments *m,
+                                   const struct fit_system *system, struct readings *room, struct fit_spread *spread, struct shape *shape) {
   const struct factor *x = &m->x, *y = &m->y;
   int32_t *moved = room->q28;
   for (int i = 0; i < COLUMNS; i++) {
@@ -462,9 +450,8 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const stru
 }
 
 /* The flags of the shape that apply. If it is elongated, separate widths would move the location. */
-static NOINLINE uint32_t judge_shape(const struct readings *readings, const struct fit_settings *settings,
-                                     const struct fit_system *system, const struct shape *shape,
-                                     struct fit_spread *spread) {
+static NOINLINE uint32_t judge_shape(const struct readings *readings, const struct fit_settings *settings, const struct fit_system *system,
+                                     const struct shape *shape, struct fit_spread *spread) {
   const struct state *at = &system->at;
   if (at->height > SHAPE_HEIGHT_MAX_Q26) {
     return 0;
@@ -472,11 +459,10 @@ static NOINLINE uint32_t judge_shape(const struct readings *readings, const stru
   struct scaled length_square =
       fit_scaled_short(scaled_add(scaled_mul(shape->stretch, shape->stretch), scaled_mul(shape->slant, shape->slant)));
   struct scaled noise = fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28);
-  struct scaled by_gains = scaled_mul(
-      fit_scaled_from((int32_t)shape->by_gains, SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
-      scaled_mul(spread->amplitude, spread->amplitude));
-  struct scaled variance =
-      fit_scaled_short(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
+  struct scaled by_gains =
+      scaled_mul(fit_scaled_from((int32_t)shape->by_gains, SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
+                 scaled_mul(spread->amplitude, spread->amplitude));
+  struct scaled variance = fit_scaled_short(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
   struct scaled least = scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE));
   uint32_t flags = 0;
   if (scaled_sub(scaled_mul(length_square, length_square), least).mantissa > 0) {
@@ -496,9 +482,8 @@ static NOINLINE uint32_t judge_shape(const struct readings *readings, const stru
   return flags;
 }
 
-/* First guess, every sensor there: the marginals weighted by the row and the column of the largest
- * reading are the two factors of the Gaussian, and the logarithm of each a parabola. Leaves the
- * marginal in g and its logarithm, weighted by it, in `weighted` (Q14). */
+/* First guess, every sensor there: the marginals weighted by the row and the column of the largest reading are the two factors of the
+ * Gaussian, and the logarithm of each a parabola. Leaves the marginal in g and its logarithm, weighted by it, in `weighted` (Q14). */
 static NOINLINE void set_marginal(struct factor *f, const int32_t *marginal, int32_t *weighted, int nodes) {
   int32_t largest = 1;
   for (int i = 0; i < nodes; i++) {
@@ -531,8 +516,7 @@ static NOINLINE struct scaled ridged(int32_t b, int32_t norm, int32_t q) {
   return scaled_div(scaled_from(b, -14 - q), scaled_add(scaled_from(norm, 3 - 2 * q), GUESS_RIDGE));
 }
 
-static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readings *readings, struct moments *m,
-                           struct state *state) {
+static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readings *readings, struct moments *m, struct state *state) {
   const int32_t *p = readings->q14;
   int peak_column = 0, peak_row = 0;
   int32_t peak = p[0];
@@ -561,8 +545,8 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   /* From the parabola's coefficients: height = -c3, centre = slope / 2 + c1 / (2 height). */
   struct scaled c1 = ridged(product_of(m->x.linear, weighted_x, COLUMNS), m->x.linear_norm, m->x.linear_q);
   struct scaled c2 = ridged(product_of(m->y.linear, weighted_y, ROWS), m->y.linear_norm, m->y.linear_q);
-  struct scaled b3 = scaled_from(
-      product_of(m->x.square, weighted_x, COLUMNS) + product_of(m->y.square, weighted_y, ROWS), -14 - m->square_q);
+  struct scaled b3 =
+      scaled_from(product_of(m->x.square, weighted_x, COLUMNS) + product_of(m->y.square, weighted_y, ROWS), -14 - m->square_q);
   struct scaled norm = scaled_from(m->x.square_norm + m->y.square_norm, 3 - 2 * m->square_q);
   struct scaled height = scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, b3), scaled_add(norm, GUESS_RIDGE));
   state->height = fixed_clamp(scaled_to_fixed(height, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
@@ -574,9 +558,9 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
 }
 
 /* The dip, and the sensors' own: what of the readings is not the model's. */
-static NOINLINE void take_out(const struct fit_array *array, const int32_t *pressure_Pa_q10,
-                              const struct fit_settings *settings, const struct state *state, const struct moments *m,
-                              const struct fit_system *system, int left, struct readings *readings) {
+static NOINLINE void take_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
+                              const struct state *state, const struct moments *m, const struct fit_system *system, int left,
+                              struct readings *readings) {
   const int32_t rise_q22 = fit_grid_rise(system->at.height, m->x.offset, m->y.offset);
   if (readings->dip_share.mantissa != 0) {
     fit_grid_take_dip_out(array, pressure_Pa_q10, state, system->amplitude_q28, rise_q22, readings);

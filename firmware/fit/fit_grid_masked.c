@@ -35,8 +35,7 @@
 #define SUM_BITS (NODES > 15 ? 25 : 26)
 #define COARSE_SHIFT (NODES > 15 ? 4 : 2)
 
-/* A node below 2^-25 of the strongest carries nothing; one that is not used is as far as that, and
- * its reading counts as 0. */
+/* A node below 2^-25 of the strongest carries nothing; one that is not used is as far as that, and its reading counts as 0. */
 #define FAR 25
 #define UNUSED (1 << 24)
 
@@ -44,8 +43,7 @@
 #define COARSE_ITERATIONS 3
 #define FINE_ITERATIONS 3
 
-/* One sensor: the model there and the columns of the normal equations. Side by side, so that one
- * pointer reaches them all. */
+/* One sensor: the model there and the columns of the normal equations. Side by side, so that one pointer reaches them all. */
 struct node {
   int32_t e;               /* Q30; then the residual, Q28 */
   int32_t mantissa, shift; /* e again, to 15 bits of its own: mantissa * 2^-(15 + shift) */
@@ -53,9 +51,8 @@ struct node {
   int32_t p1, p2, p3;      /* e times the polynomials of struct fit_system; |.| < 2^15 */
 };
 
-/* The columns and the polynomials behind them. The polynomials are those that were orthogonal
- * under the previous iterate, about the present mean; what is missing to be orthogonal under the
- * present one is small, and the factors below take it out of the right-hand side. */
+/* The columns and the polynomials behind them. The polynomials are those that were orthogonal under the previous iterate, about the present
+ * mean; what is missing to be orthogonal under the present one is small, and the factors below take it out of the right-hand side. */
 struct columns {
   struct node node[MOST_NODES];
   bool dip;
@@ -93,8 +90,7 @@ enum { STEP = sizeof(struct node) / sizeof(int32_t) };
 
 /* Brings a column in Qraw_q to this number of bits; returns its norm with the ridge. What is smaller stays
  * as it is, since there is nothing below its last bit. */
-FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t bits, int32_t raw_q, const struct ridge *ridge,
-                               int32_t *q) {
+FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t bits, int32_t raw_q, const struct ridge *ridge, int32_t *q) {
   int32_t shift = fixed_bits(size) - bits;
   int32_t least = raw_q - ridge->finest_q;
   shift = shift < least ? least : shift;
@@ -131,11 +127,9 @@ static NOINLINE uint32_t take_dip(int32_t *column, const struct node *node, cons
   return size;
 }
 
-/* Column of the model times (along_x[i] + along_y[j]), less the dip times that of `dip`, if any. along_y: NULL for
- * none. */
-FIXED_INLINE int32_t fill_column(int32_t *column, const struct node *node, const int32_t *along_x,
-                                 const int32_t *along_y, int32_t q, const struct polynomial *dip,
-                                 const struct ridge *ridge, int32_t *column_q) {
+/* Column of the model times (along_x[i] + along_y[j]), less the dip times that of `dip`, if any. along_y: NULL for none. */
+FIXED_INLINE int32_t fill_column(int32_t *column, const struct node *node, const int32_t *along_x, const int32_t *along_y, int32_t q,
+                                 const struct polynomial *dip, const struct ridge *ridge, int32_t *column_q) {
   uint32_t size = 1;
   int32_t *to = column;
   for (int i = 0; i < COLUMNS; i++) {
@@ -154,12 +148,12 @@ FIXED_INLINE int32_t fill_column(int32_t *column, const struct node *node, const
   }
   return normalise(column, size, COLUMN_BITS(dip), q - 1, ridge, column_q);
 }
-static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int32_t *along_x, const int32_t *along_y,
-                             int32_t q, const struct polynomial *dip, const struct ridge *ridge, int32_t *column_q) {
+static NOINLINE int32_t fill(int32_t *column, const struct node *node, const int32_t *along_x, const int32_t *along_y, int32_t q,
+                             const struct polynomial *dip, const struct ridge *ridge, int32_t *column_q) {
   return fill_column(column, node, along_x, along_y, q, dip, ridge, column_q);
 }
-static NOINLINE int32_t fill_along_x(struct node *node, const int32_t *along_x, const struct polynomial *dip,
-                                     const struct ridge *ridge, int32_t *column_q) {
+static NOINLINE int32_t fill_along_x(struct node *node, const int32_t *along_x, const struct polynomial *dip, const struct ridge *ridge,
+                                     int32_t *column_q) {
   return fill_column(&node->p1, node, along_x, NULL, LINEAR_Q, dip, ridge, column_q);
 }
 
@@ -169,9 +163,7 @@ FIXED_INLINE int32_t times_q12(int32_t value, int32_t coefficient) {
 }
 
 /* product / norm in Q12. */
-FIXED_INLINE int32_t factor(int32_t product, int32_t norm) {
-  return fixed_clamp(port_divide(product, norm >> 12), -INT16_MAX, INT16_MAX);
-}
+FIXED_INLINE int32_t factor(int32_t product, int32_t norm) { return fixed_clamp(port_divide(product, norm >> 12), -INT16_MAX, INT16_MAX); }
 
 /* From Q12 in units of columns to LINEAR_Q. */
 FIXED_INLINE int32_t to_poly(int32_t factor_q12, int32_t finer, int32_t limit) {
@@ -267,8 +259,7 @@ static NOINLINE void set_dips(const struct columns *c, struct dips *dips) {
   }
 }
 
-/* Makes the column orthogonal to the model, and mends its norm. Returns what that took from the
- * polynomial, LINEAR_Q. */
+/* Makes the column orthogonal to the model, and mends its norm. Returns what that took from the polynomial, LINEAR_Q. */
 static NOINLINE int32_t project_out(const struct columns *c, int32_t *column, int32_t q, int32_t *norm) {
   int32_t sum = 0;
   const int32_t *from = column;
@@ -366,8 +357,7 @@ FIXED_INLINE struct scaled long_norm(int32_t norm, int32_t q) {
 }
 
 /* The system from sums over the columns in Q q. */
-static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t sum2, int32_t sum3, int32_t q,
-                               struct fit_system *system) {
+static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t sum2, int32_t sum3, int32_t q, struct fit_system *system) {
   sum2 -= times_q12(sum1, c->f21);
   sum3 -= times_q12(sum1, c->f31) + times_q12(sum2, c->f32);
   system->b1 = (struct scaled){sum1, -q - c->q1};
@@ -385,9 +375,8 @@ static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t su
 
 /* First guess: the logarithm of the readings is a paraboloid, fitted with the readings themselves
  * as the weights. The ridge decides where too few of them are large. */
-static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readings *readings,
-                           const struct fit_settings *settings, struct columns *c, struct fit_system *system,
-                           struct state *state) {
+static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readings *readings, const struct fit_settings *settings,
+                           struct columns *c, struct fit_system *system, struct state *state) {
   int32_t up = readings->shift > 0 ? readings->shift : 0, down = up - readings->shift;
   int32_t largest = (readings->largest >> down) * (1 << up);
   int32_t noise = settings->noise_Pa_q10 >> down;
@@ -432,8 +421,7 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
 
 /* One factor of the separable Gaussian as mantissa (Q30, above 0.5) * 2^-shift, relative to the
  * nearest node. Returns the offset of the centre from that node, Q26. */
-static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes, int origin, int32_t centre,
-                                   int32_t height) {
+static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes, int origin, int32_t centre, int32_t height) {
   int32_t offset;
   struct fit_exponent exponent = fit_exponent_first(nodes, origin, centre, height, &offset);
   for (int i = 0; i < nodes; i++) {
@@ -496,8 +484,7 @@ static NOINLINE void set_dip(const struct readings *readings, const struct fit_s
   int32_t narrowness = port_divide(readings->dip_height, at->height >> 12);
   c->narrowness_q12 = narrowness < NARROWNESS_MAX_Q12 ? narrowness : NARROWNESS_MAX_Q12;
   struct dip dip;
-  int32_t depth_q28 =
-      fit_grid_dip(readings->dip_height, readings->dip_share, at, 1 << 28, system->rise_q22, DEPTH_MAX_Q28, &dip);
+  int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, 1 << 28, system->rise_q22, DEPTH_MAX_Q28, &dip);
   for (int k = 0; k < NODES; k++) {
     int32_t along = fixed_mul_q30(depth_q28 * 4, dip.x[k / ROWS]);
     c->node[k].d = readings->residual[k] == 0 ? fixed_mul_q30(along, dip.y[k % ROWS]) : 0;
@@ -550,9 +537,8 @@ static NOINLINE void add_dip_errors(const struct columns *c, struct readings *ro
 }
 
 /* What errors of single sensors make of the result. The columns are made orthogonal for it. */
-static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings,
-                                   struct columns *c, const struct fit_system *system, struct readings *room,
-                                   struct fit_spread *spread) {
+static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings, struct columns *c,
+                                   const struct fit_system *system, struct readings *room, struct fit_spread *spread) {
   const struct fit_columns_q q = {c->q1, c->q2, c->q3};
   fit_grid_begin_spread(room->shift, system, &q, spread);
   const int32_t most = 3 << 14;
@@ -578,8 +564,7 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const stru
   }
   fit_grid_add_moves(room, &spread->by_gains, &spread->shape_y);
   for (int k = 0; k < NODES; k++) {
-    room->q28[k] =
-        (spread->f0 * node[k].e + spread->f1 * node[k].p1 + spread->f2 * node[k].p2 + spread->f3 * node[k].p3) >> 15;
+    room->q28[k] = (spread->f0 * node[k].e + spread->f1 * node[k].p1 + spread->f2 * node[k].p2 + spread->f3 * node[k].p3) >> 15;
   }
   fit_grid_add_moves(room, &spread->force_by_gains, &spread->shape_force);
   fit_grid_end_spread(settings, system, spread);
@@ -587,8 +572,7 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const stru
 
 enum accuracy { COARSE, FINE, LAST };
 
-static NOINLINE void evaluate(const struct readings *readings, enum accuracy accuracy, struct columns *c,
-                              struct fit_system *system) {
+static NOINLINE void evaluate(const struct readings *readings, enum accuracy accuracy, struct columns *c, struct fit_system *system) {
   system->rise_q22 = set_model(&system->at, readings->residual, c);
   set_dip(readings, system, c);
   fill_columns(readings, &rounding_ridge, c);
@@ -638,8 +622,8 @@ static NOINLINE void evaluate(const struct readings *readings, enum accuracy acc
 }
 
 /* Readings in use, which sensors are not (in their residual's place), and how many are. False: nothing to fit. */
-static bool gather(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                   const struct fit_settings *settings, struct readings *readings, int *count) {
+static bool gather(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+                   struct readings *readings, int *count) {
   *count = 0;
   for (int k = 0; k < NODES; k++) {
     bool used = usable >> array->grid.sensor[k] & 1;
@@ -649,8 +633,8 @@ static bool gather(const struct fit_array *array, const int32_t *pressure_Pa_q10
   return fit_grid_take_readings(array, pressure_Pa_q10, usable, settings, readings);
 }
 
-bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                     const struct fit_settings *settings, struct fit_result *result) {
+bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+                     struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
   fit_use_rectangle(grid);
   struct readings readings;
@@ -709,8 +693,8 @@ static int32_t share_of(int32_t value, int32_t sum, int32_t sum_shift) {
   return port_divide((value * value) >> sum_shift, (sum >> 15) + 1);
 }
 
-int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                     const struct fit_settings *settings, const struct fit_result *result) {
+int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+                     const struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
   fit_use_rectangle(grid);
   struct readings readings;
@@ -732,8 +716,7 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
   if (settings->own) {
     const int32_t peak_q28 =
         fit_scaled_to_fixed(scaled_mul(fit_grid_scaled(result->p0_Pa), fit_scaled_from(1024, readings.shift - 28)), 28);
-    fit_grid_take_own_out(array, settings, usable, &system.at, fixed_clamp(peak_q28, 0, FIT_OWN_PEAK_MAX_Q28),
-                          &readings);
+    fit_grid_take_own_out(array, settings, usable, &system.at, fixed_clamp(peak_q28, 0, FIT_OWN_PEAK_MAX_Q28), &readings);
   }
   evaluate(&readings, FINE, &c, &system);
 

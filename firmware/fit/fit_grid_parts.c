@@ -83,9 +83,8 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
   return true;
 }
 
-int fit_grid_weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used,
-                   const struct readings *readings, int32_t noise_most, int32_t model_sd_q16, int32_t *weight_q12,
-                   struct fit_base *base) {
+int fit_grid_weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used, const struct readings *readings,
+                   int32_t noise_most, int32_t model_sd_q16, int32_t *weight_q12, struct fit_base *base) {
   int32_t noise = fixed_clamp(shifted(settings->noise_Pa_q10, readings->shift - 6), 1, noise_most);
   int32_t of_one = fixed_longer_leg(noise, ((readings->largest_q28 >> 14) * model_sd_q16) >> 8);
   int sensors = 0;
@@ -133,15 +132,15 @@ int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled sha
   return fixed_clamp(fit_scaled_to_fixed(peak, 28), 0, most_q28);
 }
 
-int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at, int32_t amplitude_q28,
-                     int32_t rise_q22, int32_t most_q28, struct dip *dip) {
+int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at, int32_t amplitude_q28, int32_t rise_q22, int32_t most_q28,
+                     struct dip *dip) {
   set_dip(dip->x, COLUMNS, COLUMNS / 2, at->x, height);
   set_dip(dip->y, ROWS, ROWS / 2, at->y, height);
   return fit_grid_peak(amplitude_q28, rise_q22, share, most_q28);
 }
 
-void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct state *at,
-                           int32_t amplitude_q28, int32_t rise_q22, struct readings *readings) {
+void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct state *at, int32_t amplitude_q28,
+                           int32_t rise_q22, struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   struct dip dip;
   const int32_t most = readings->largest_q28 >> 2; /* FIT_DIP_DEPTH_MAX */
@@ -177,8 +176,8 @@ static NOINLINE void set_own_axis(int32_t nodes, int32_t centre, int32_t height,
 
 /* A Gaussian that is wider by b and whose sensor is off by o is, d from the contact to its place in
  * the array, larger by (b d - o)' d / sigma^2 of itself. */
-void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, uint32_t usable,
-                           const struct state *at, int32_t peak_q28, struct readings *readings) {
+void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, uint32_t usable, const struct state *at,
+                           int32_t peak_q28, struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   struct own_axis x, y;
   set_own_axis(COLUMNS, at->x, at->height, &x);
@@ -187,8 +186,8 @@ void fit_grid_take_own_out(const struct fit_array *array, const struct fit_setti
     int32_t column_q28 = fixed_mul_q30(peak_q28, x.bell_q30[i]);
     for (int j = 0; j < ROWS; j++, k++) {
       const struct fit_own *own = &settings->own[sensor[k]];
-      int32_t more_q26 = own->wider_q15 * (x.square_q11[i] + y.square_q11[j]) - own->off_x_q15 * x.slope_q11[i] -
-                         own->off_y_q15 * y.slope_q11[j];
+      int32_t more_q26 =
+          own->wider_q15 * (x.square_q11[i] + y.square_q11[j]) - own->off_x_q15 * x.slope_q11[i] - own->off_y_q15 * y.slope_q11[j];
       int32_t share_q15 = fixed_clamp(more_q26 >> 11, -OWN_SHARE_MAX_Q15, OWN_SHARE_MAX_Q15);
       if (usable >> sensor[k] & 1) {
         int32_t bell_q15 = fixed_mul_q30(column_q28, y.bell_q30[j]) >> 13;
@@ -200,8 +199,7 @@ void fit_grid_take_own_out(const struct fit_array *array, const struct fit_setti
   }
 }
 
-void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                              struct readings *readings) {
+void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   for (int k = 0; k < NODES; k++) {
     if (usable >> sensor[k] & 1) {

@@ -80,23 +80,21 @@ FIXED_INLINE int32_t exp2_rough(uint32_t z_q22) {
   return whole > 29 ? 0 : fit_exp2_table[(z_q22 >> 14) & 255] >> whole;
 }
 
-/* The exponent of the Gaussian along an axis, Q22, relative to the node nearest to its centre: k (curvature k - slope)
- * with k counted from there, by its differences. It is exactly a parabola, so the rounding of the two coefficients
- * moves centre and width and cannot show in the residual. The 2 more than makes up for both roundings, so it is never
- * negative. */
+/* The exponent of the Gaussian along an axis, Q22, relative to the node nearest to its centre: k (curvature k - slope) with k counted from
+ * there, by its differences. It is exactly a parabola, so the rounding of the two coefficients moves centre and width and cannot show in
+ * the residual. The 2 more than makes up for both roundings, so it is never negative. */
 struct fit_exponent {
   uint32_t value, difference, curvature;
 };
 /* That of the first node. offset: of the centre from the nearest node, Q26. */
-FIXED_INLINE struct fit_exponent fit_exponent_first(int nodes, int origin, int32_t centre, int32_t height,
-                                                    int32_t *offset) {
+FIXED_INLINE struct fit_exponent fit_exponent_first(int nodes, int origin, int32_t centre, int32_t height, int32_t *offset) {
   int32_t nearest = fixed_clamp((centre + (ONE_Q26 >> 1)) >> 26, -origin, nodes - 1 - origin);
   *offset = centre - nearest * ONE_Q26;
   int32_t slope = fixed_mul_q32(height, *offset * 8); /* Q22 */
   int32_t curvature = (height >> 4) + 2;
   int32_t k = -origin - nearest;
-  return (struct fit_exponent){(uint32_t)k * (uint32_t)(curvature * k - slope),
-                               (uint32_t)(curvature * (2 * k + 1) - slope), (uint32_t)curvature};
+  return (struct fit_exponent){(uint32_t)k * (uint32_t)(curvature * k - slope), (uint32_t)(curvature * (2 * k + 1) - slope),
+                               (uint32_t)curvature};
 }
 FIXED_INLINE void fit_exponent_next(struct fit_exponent *exponent) {
   exponent->value += exponent->difference;
@@ -116,9 +114,7 @@ FIXED_INLINE int32_t log2_q15(int32_t value) {
  * twenty cycles of a call count less than flash. */
 uint64_t fit_packed_from(int32_t value, int32_t exponent);
 uint64_t fit_packed_sqrt(struct scaled a);
-FIXED_INLINE struct scaled fit_scaled_from(int32_t value, int32_t exponent) {
-  return scaled_unpack(fit_packed_from(value, exponent));
-}
+FIXED_INLINE struct scaled fit_scaled_from(int32_t value, int32_t exponent) { return scaled_unpack(fit_packed_from(value, exponent)); }
 FIXED_INLINE struct scaled fit_scaled_short(struct scaled a) { return fit_scaled_from(a.mantissa, a.exponent); }
 FIXED_INLINE struct scaled fit_scaled_sqrt(struct scaled a) { return scaled_unpack(fit_packed_sqrt(a)); }
 int32_t fit_scaled_to_fixed(struct scaled a, int32_t q);
@@ -134,47 +130,41 @@ struct dip {
 };
 /* Sets the factors about this contact, whose model is amplitude 2^rise at the centre, and returns the dip's depth
  * there, at most most_q28. height: of the dip's Gaussian, Q26; share: its depth, of the contact's. */
-int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at, int32_t amplitude_q28,
-                     int32_t rise_q22, int32_t most_q28, struct dip *dip);
+int32_t fit_grid_dip(int32_t height, struct scaled share, const struct state *at, int32_t amplitude_q28, int32_t rise_q22, int32_t most_q28,
+                     struct dip *dip);
 
 /* Adds the dip to the readings of a full rectangle. */
-void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct state *at,
-                           int32_t amplitude_q28, int32_t rise_q22, struct readings *readings);
+void fit_grid_take_dip_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct state *at, int32_t amplitude_q28,
+                           int32_t rise_q22, struct readings *readings);
 
 /* The model at the centre, where it is amplitude 2^rise: at most most_q28. */
 int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled share, int32_t most_q28);
 
 /* Corrects the readings of the usable sensors by what is their own (fit_settings), about a contact of this peak. */
 #define FIT_OWN_PEAK_MAX_Q28 (1 << 30)
-void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, uint32_t usable,
-                           const struct state *at, int32_t peak_q28, struct readings *readings);
+void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, uint32_t usable, const struct state *at,
+                           int32_t peak_q28, struct readings *readings);
 
-/* The errors of the readings of the sensors in use, units of Q22: base of one of weight 1, by the noise, held to
- * noise_most, and a share model_sd_q16 of the largest reading. The weights of the others are 0. Returns how many are in
- * use. */
+/* The errors of the readings of the sensors in use, units of Q22: base of one of weight 1, by the noise, held to noise_most, and a share
+ * model_sd_q16 of the largest reading. The weights of the others are 0. Returns how many are in use. */
 struct fit_base {
   int32_t noise_q22, base_q22;
   int32_t squares_q12; /* sum of those of the weights */
 };
-int fit_grid_weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used,
-                   const struct readings *readings, int32_t noise_most, int32_t model_sd_q16, int32_t *weight_q12,
-                   struct fit_base *base);
+int fit_grid_weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used, const struct readings *readings,
+                   int32_t noise_most, int32_t model_sd_q16, int32_t *weight_q12, struct fit_base *base);
 
-/* Sum of the readings, Q20. Of those that are a contact's the largest is 0.5 to 1, and the sum FIT_SUM_LEAST_Q20 and
- * more. */
+/* Sum of the readings, Q20. Of those that are a contact's the largest is 0.5 to 1, and the sum FIT_SUM_LEAST_Q20 and more. */
 int32_t fit_grid_sum_q20(const int32_t *q28);
 #define FIT_SUM_LEAST_Q20 (1 << 18)
 
-/* Whether a sum after another is that of another contact: less than a contact has, or four times as much, or a quarter.
- */
+/* Whether a sum after another is that of another contact: less than a contact has, or four times as much, or a quarter. */
 FIXED_INLINE bool fit_is_another(int32_t sum_q20, int32_t before_q20) {
-  return sum_q20 < FIT_SUM_LEAST_Q20 || before_q20 < FIT_SUM_LEAST_Q20 || sum_q20 >> 2 >= before_q20 ||
-         before_q20 >> 2 >= sum_q20;
+  return sum_q20 < FIT_SUM_LEAST_Q20 || before_q20 < FIT_SUM_LEAST_Q20 || sum_q20 >> 2 >= before_q20 || before_q20 >> 2 >= sum_q20;
 }
 
 /* Readings below zero as they are, where fit_grid_take_readings took them as zero. */
-void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                              struct readings *readings);
+void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, struct readings *readings);
 
 /* value >= 0 and finite. */
 uint64_t fit_packed_float(float value);

@@ -30,8 +30,7 @@ void fit_grid_add_prior(const struct readings *readings, struct fit_system *syst
 }
 
 /* b / (d stiffness) in Qq, at most 2^30. Near the end b is small, and its last bits decide. */
-FIXED_INLINE int32_t step_along(const struct scaled *b, const struct scaled *d, const struct scaled *stiffness,
-                                int32_t q) {
+FIXED_INLINE int32_t step_along(const struct scaled *b, const struct scaled *d, const struct scaled *stiffness, int32_t q) {
   int32_t divisor = ((d->mantissa >> 14) * stiffness->mantissa) >> 13; /* below 2^18 */
   int32_t up = 31 - fixed_bits(fixed_size(b->mantissa) | 1);
   int32_t quotient = port_divide(b->mantissa * (1 << up), divisor < 2 ? 2 : divisor);
@@ -95,8 +94,7 @@ void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
 static int32_t peak_of(const struct readings *readings, const struct fit_system *system, int32_t *exponent) {
   int32_t rise_q22 = fixed_clamp(system->rise_q22, 0, PEAK_RISE_MAX_Q22);
   int32_t up = 30 - fixed_bits((uint32_t)system->amplitude_q28);
-  int32_t peak =
-      fixed_mul_q30(system->amplitude_q28 * (1 << up), exp2_negative((1u << 22) - ((uint32_t)rise_q22 & 0x3FFFFF)));
+  int32_t peak = fixed_mul_q30(system->amplitude_q28 * (1 << up), exp2_negative((1u << 22) - ((uint32_t)rise_q22 & 0x3FFFFF)));
   *exponent = (rise_q22 >> 22) + 1 - up - 10 - readings->shift;
 
   /* The last step's own part, relative: c1 and c2 tilt the model about its mean, c3 bends it. */
@@ -135,8 +133,8 @@ FIXED_INLINE struct scaled scaled_mean(struct scaled sum, int count) {
 
 /* Raises the inverse of d3 to that by which the variance of a reading gives that of c3: the prior's
  * row varies by a width of its own, not as the readings do. */
-static NOINLINE void widen_for_prior(const struct readings *readings, const struct fit_system *system,
-                                     const struct scaled *variance, struct scaled *inverse3) {
+static NOINLINE void widen_for_prior(const struct readings *readings, const struct fit_system *system, const struct scaled *variance,
+                                     struct scaled *inverse3) {
   struct scaled excess = fit_scaled_short(scaled_sub(scaled_square(readings->prior_sd), *variance));
   if (excess.mantissa > 0) {
     struct scaled share = scaled_mul(system->prior_row, *inverse3);
@@ -147,8 +145,7 @@ static NOINLINE void widen_for_prior(const struct readings *readings, const stru
 
 /* Location, width, peak and force; returns the force. */
 static NOINLINE struct scaled set_values(const struct fit_grid_shape *grid, const struct readings *readings,
-                                         const struct fit_system *system, const struct state *state,
-                                         struct fit_result *result) {
+                                         const struct fit_system *system, const struct state *state, struct fit_result *result) {
   int32_t x = fixed_clamp(state->x, grid->x_min, grid->x_max);
   int32_t y = fixed_clamp(state->y, grid->y_min, grid->y_max);
   int32_t peak_exponent;
@@ -168,9 +165,8 @@ static NOINLINE struct scaled set_values(const struct fit_grid_shape *grid, cons
 }
 
 /* The flags that need no variance. */
-static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid, const struct readings *readings,
-                                  const struct fit_settings *settings, const struct fit_system *system,
-                                  const struct state *state) {
+static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid, const struct readings *readings, const struct fit_settings *settings,
+                                  const struct fit_system *system, const struct state *state) {
   uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
   if (settings->noise_Pa_q10 > port_divide(readings->largest, FIT_LOW_SIGNAL_SIGMA)) {
     flags |= CONTACT_FLAG_LOW_SIGNAL;
@@ -179,8 +175,8 @@ static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid, const struc
     flags |= CONTACT_FLAG_FLAT;
   }
   if (state->x <= grid->x_min || state->x >= grid->x_max || state->y <= grid->y_min || state->y >= grid->y_max ||
-      state->height <= HEIGHT_MIN_Q26 || state->height >= HEIGHT_MAX_Q26 ||
-      system->amplitude_q28 <= AMPLITUDE_MIN_Q28 || system->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
+      state->height <= HEIGHT_MIN_Q26 || state->height >= HEIGHT_MAX_Q26 || system->amplitude_q28 <= AMPLITUDE_MIN_Q28 ||
+      system->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
     flags |= CONTACT_FLAG_AT_BOUND;
   }
   return flags;
@@ -218,19 +214,16 @@ struct scatter {
   bool misfit, rough, other_model;
 };
 
-static NOINLINE void set_scatter(const struct readings *readings, const struct fit_settings *settings,
-                                 const struct fit_system *system, const struct fit_spread *spread, int count,
-                                 struct scatter *scatter, struct fit_result *result) {
+static NOINLINE void set_scatter(const struct readings *readings, const struct fit_settings *settings, const struct fit_system *system,
+                                 const struct fit_spread *spread, int count, struct scatter *scatter, struct fit_result *result) {
   struct scaled left = fit_scaled_from(system->b0, system->residual_shift - 38);
-  struct scaled square_sum =
-      scaled_sub(fit_scaled_short(system->square_sum), scaled_mul(scaled_square(left), spread->inverse_mass));
+  struct scaled square_sum = scaled_sub(fit_scaled_short(system->square_sum), scaled_mul(scaled_square(left), spread->inverse_mass));
   square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
   struct scaled rms = fit_scaled_sqrt(scaled_mean(square_sum, count));
   result->residual_rms_Pa = fit_float(rms.mantissa, rms.exponent + 18 - readings->shift);
 
   scatter->noise = scaled_square(fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28));
-  struct scaled model = scaled_mul(fit_scaled_from(settings->model_sd_q16, -16),
-                                   fit_scaled_from(readings->largest, readings->shift - 28));
+  struct scaled model = scaled_mul(fit_scaled_from(settings->model_sd_q16, -16), fit_scaled_from(readings->largest, readings->shift - 28));
   scatter->all = scaled_add(scatter->noise, scaled_square(model));
   struct scaled amplitude_square = scaled_square(spread->amplitude);
   struct scaled gains = fit_scaled_from((int32_t)spread->gains, SPREAD_SQUARE_SHIFT - 32 - 2 * spread->gain_shift);
@@ -253,9 +246,8 @@ static NOINLINE void set_scatter(const struct readings *readings, const struct f
   scatter->other_model = scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0;
 }
 
-bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
-                       const struct fit_settings *settings, const struct fit_system *system,
-                       const struct fit_spread *spread, const struct state *state, int count,
+bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings, const struct fit_settings *settings,
+                       const struct fit_system *system, const struct fit_spread *spread, const struct state *state, int count,
                        struct fit_result *result) {
   struct scaled force = set_values(grid, readings, system, state, result);
   uint32_t flags = flags_of(grid, readings, settings, system, state);
@@ -267,8 +259,7 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   }
 
   struct scaled pitch = scaled_near(grid->pitch, grid->pitch_exponent - 6);
-  struct scaled form =
-      scaled_mul(location_form(system, spread, &inverse3), scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
+  struct scaled form = scaled_mul(location_form(system, spread, &inverse3), scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
   struct scaled sd = fit_scaled_sqrt(scaled_mul(scatter.noise, form));
   result->location_noise_mm = fit_scaled_float(sd);
   struct scaled move_x = fit_scaled_from(system->move_x_q22, -22); /* what it moved is not settled */
@@ -276,8 +267,7 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   struct scaled apart = scaled_add(scaled_square(move_x), scaled_square(move_y));
   apart = scaled_add(scaled_add(spread->location_variance, spread->apart), apart);
   apart = scaled_mul(apart, scaled_square(pitch));
-  sd = flags & CONTACT_FLAG_AT_BOUND ? scaled_mul(BOUND_SD, pitch)
-                                     : fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), apart));
+  sd = flags & CONTACT_FLAG_AT_BOUND ? scaled_mul(BOUND_SD, pitch) : fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), apart));
   result->location_sd_mm = fit_scaled_float(sd);
   struct scaled limit = fit_grid_scaled(fit_location_sd_limit_mm(settings));
   if (scaled_sub(sd, limit).mantissa > 0) {

@@ -9,9 +9,8 @@
  *   p1 = x - mean_x,
  *   p2 = y - mean_y - cross p1,
  *   p3 = x^2 + y^2 - slope_x x - slope_y y + constant,
- * e being the model with amplitude 1 at the strongest node, give or take a factor of four. The
- * coefficients are such that the four are orthogonal over the sensors in use, so the normal matrix
- * is diagonal. Mantissas of the struct scaled here have up to 31 bits. */
+ * e being the model with amplitude 1 at the strongest node, give or take a factor of four. The coefficients are such that the four are
+ * orthogonal over the sensors in use, so the normal matrix is diagonal. Mantissas of the struct scaled here have up to 31 bits. */
 struct fit_system {
   struct state at;        /* where the model is linearised */
   int32_t mean_x, mean_y; /* Q26, pitches from the grid's origin node, as the next */
@@ -78,9 +77,7 @@ void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
 
 /* 1 / value; what is not positive counts as the last place. */
 uint64_t fit_packed_reciprocal(struct scaled value);
-FIXED_INLINE struct scaled fit_grid_reciprocal(struct scaled value) {
-  return scaled_unpack(fit_packed_reciprocal(value));
-}
+FIXED_INLINE struct scaled fit_grid_reciprocal(struct scaled value) { return scaled_unpack(fit_packed_reciprocal(value)); }
 
 /* How an error of each reading moves the result. Errors that are the same for every sensor, as the noise, need no more
  * than the norms of the columns; those of the gains are each sensor's own, and the model's own error has a shape. So
@@ -108,20 +105,18 @@ struct fit_spread {
   uint32_t by_gains; /* of the squares of what they make of x and y */
   uint32_t force_by_gains;
   struct scaled location_variance, force_variance; /* of all of this, once it is concluded */
-  struct scaled apart;                   /* square of how far another shape of the contact would move it, pitches */
-  int32_t shape_x, shape_y, shape_force; /* what the model error's shape makes of these */
+  struct scaled apart;                             /* square of how far another shape of the contact would move it, pitches */
+  int32_t shape_x, shape_y, shape_force;           /* what the model error's shape makes of these */
 };
 
 /* The square of a number of 15 bits, so that those of all sensors and of two coordinates add up. */
 #define SPREAD_SQUARE_SHIFT (NODES > 15 ? 6 : 5)
 
 /* shift: the readings'. The columns have at most 1.5 * 2^15. */
-void fit_grid_begin_spread(int32_t shift, const struct fit_system *system, const struct fit_columns_q *columns,
-                           struct fit_spread *spread);
+void fit_grid_begin_spread(int32_t shift, const struct fit_system *system, const struct fit_columns_q *columns, struct fit_spread *spread);
 
 /* The variances that the sums make: pitches squared, share of the force squared. */
-void fit_grid_end_spread(const struct fit_settings *settings, const struct fit_system *system,
-                         struct fit_spread *spread);
+void fit_grid_end_spread(const struct fit_settings *settings, const struct fit_system *system, struct fit_spread *spread);
 
 /* The readings' room is used for what each sensor does, in the order of the nodes. In: its e (Q15)
  * in q28. Out: the error that its gain and its past make of its reading in q14, the share of the amplitude
@@ -135,14 +130,12 @@ void fit_grid_add_moves(const struct readings *room, uint32_t *by_gains, int32_t
 /* Values of up to 15 bits in one unit, the largest of 13 bits. Returns the exponent of that unit. */
 int32_t fit_grid_align(const struct scaled *values, int count, int32_t *aligned);
 
-/* The result from the last system, what it makes of the errors of the readings, and the state after
- * its step; count: of the sensors in use. Returns whether it has settled with residuals that are
- * rough and beyond what noise and gains explain. */
-bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings,
-                       const struct fit_settings *settings, const struct fit_system *system,
-                       const struct fit_spread *spread, const struct state *state, int count,
+/* The result from the last system, what it makes of the errors of the readings, and the state after its step; count: of the sensors in use.
+ * Returns whether it has settled with residuals that are rough and beyond what noise and gains explain. */
+bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings, const struct fit_settings *settings,
+                       const struct fit_system *system, const struct fit_spread *spread, const struct state *state, int count,
                        struct fit_result *result);
 
 /* The sensor whose reading does not belong to the others', or -1; result: the fit to them all. */
-int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                     const struct fit_settings *settings, const struct fit_result *result);
+int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+                     const struct fit_result *result);

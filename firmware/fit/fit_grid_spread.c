@@ -13,8 +13,7 @@
 #define DOWN_MAX_Q10 23170
 #define SHAPE_USUAL_Q21 (10 << 21)
 
-/* FIT_SHAPE_PER_MODEL in terms of z^2 and the height: sigma^2 = log2(e) / (2 height) and
- * r^2 / sigma^2 = 2 z / log2(e). */
+/* FIT_SHAPE_PER_MODEL in terms of z^2 and the height: sigma^2 = log2(e) / (2 height) and r^2 / sigma^2 = 2 z / log2(e). */
 #define SHAPE_PER_MODEL ((struct scaled){19914, -14})
 #define SHAPE_KNOWN ((struct scaled){19661, -16})
 #define FORCE_SHARE ((struct scaled){20972, -17}) /* FIT_FORCE_SHAPE^2 */
@@ -60,8 +59,7 @@ FIXED_INLINE void set_units(const struct fit_columns_q *columns, const struct fi
   units->of3.exponent -= columns->q3;
 }
 
-FIXED_INLINE void set_location_moves(const struct fit_system *system, const struct units *units,
-                                     struct fit_spread *spread) {
+FIXED_INLINE void set_location_moves(const struct fit_system *system, const struct units *units, struct fit_spread *spread) {
   const struct state *at = &system->at;
   struct scaled values[5];
   int32_t aligned[5];
@@ -82,8 +80,7 @@ FIXED_INLINE void set_location_moves(const struct fit_system *system, const stru
 }
 
 /* dF / F = dp0 / p0 + 2 dsigma / sigma, each by its part in the basis. */
-FIXED_INLINE void set_force_moves(const struct fit_system *system, const struct units *units,
-                                  struct fit_spread *spread) {
+FIXED_INLINE void set_force_moves(const struct fit_system *system, const struct units *units, struct fit_spread *spread) {
   const struct state *at = &system->at;
   struct scaled values[4];
   int32_t aligned[4];
@@ -106,8 +103,7 @@ FIXED_INLINE void set_force_moves(const struct fit_system *system, const struct 
 /* What the sensors' pasts leave, as shares of the amplitude, each at most half: errors[NODES], 1 / 2^16. */
 #ifdef FT_WITHOUT_PAST
 FIXED_INLINE void set_past(int32_t shift, struct fit_spread *spread) { (void)shift, (void)spread; }
-FIXED_INLINE void put_pasts(const uint8_t *sensor, const struct fit_settings *settings, const struct fit_spread *spread,
-                            int32_t *errors) {
+FIXED_INLINE void put_pasts(const uint8_t *sensor, const struct fit_settings *settings, const struct fit_spread *spread, int32_t *errors) {
   (void)sensor, (void)settings, (void)spread;
   memset(errors, 0, NODES * sizeof errors[0]);
 }
@@ -116,8 +112,7 @@ FIXED_INLINE void set_past(int32_t shift, struct fit_spread *spread) {
   spread->past = fit_grid_reciprocal(spread->amplitude);
   spread->past.exponent += shift - 28 + 16;
 }
-FIXED_INLINE void put_pasts(const uint8_t *sensor, const struct fit_settings *settings, const struct fit_spread *spread,
-                            int32_t *errors) {
+FIXED_INLINE void put_pasts(const uint8_t *sensor, const struct fit_settings *settings, const struct fit_spread *spread, int32_t *errors) {
   int32_t any = INT16_MAX;
   for (int k = 0; k < NODES; k++) {
     any |= settings->past_sd_Pa_q10[sensor[k]];
@@ -153,8 +148,8 @@ NOINLINE void fit_grid_begin_spread(int32_t shift, const struct fit_system *syst
   spread->by_gains = spread->force_by_gains = 0;
 }
 
-NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings,
-                                  const struct state *at, struct readings *room, struct fit_spread *spread) {
+NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings, const struct state *at,
+                                  struct readings *room, struct fit_spread *spread) {
   int32_t down_x[MOST_COLUMNS], down_y[MOST_ROWS];
   set_down(down_x, COLUMNS, COLUMNS / 2, at->x, at->height);
   set_down(down_y, ROWS, ROWS / 2, at->y, at->height);
@@ -205,8 +200,7 @@ NOINLINE void fit_grid_add_moves(const struct readings *room, uint32_t *by_gains
   *by_shape = sum;
 }
 
-NOINLINE void fit_grid_end_spread(const struct fit_settings *settings, const struct fit_system *system,
-                                  struct fit_spread *spread) {
+NOINLINE void fit_grid_end_spread(const struct fit_settings *settings, const struct fit_system *system, struct fit_spread *spread) {
   const int32_t gains_exponent = SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift;
   uint32_t bend = (uint32_t)settings->model_sd_q16 * (uint32_t)(system->at.height >> 14);
   struct scaled strength = fit_scaled_from((int32_t)(bend >> 1), 1 - 16 - 12);

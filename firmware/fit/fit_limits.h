@@ -48,13 +48,12 @@
 #define FIT_SHAPE_KNOWN 0.3f
 #define FIT_BOUND_SD 1.2f /* pitches: such presses of a thin pad are off by up to 2.4 */
 
-/* A contact is elongated if log(longer width / shorter) exceeds FIT_STRETCH_LEAST, below which the cubes and spheres of
- * a layer stay, and FIT_STRETCH_SURE standard deviations of the part from noise and gains, added in quadrature; where
- * the dip is known, also a tail that is off by FIT_TAIL_ERROR of the peak, as wide as the dip. Widths are reported up
- * to a standard deviation of FIT_STRETCH_SD_MAX and a ratio of exp(FIT_STRETCH_MAX), and from a sigma of
- * FIT_SHAPE_LEAST pitches, below which the layer's own profile appears elongated. If it is elongated, the location's
- * standard deviation contains the shift by separate widths, beyond a stretch of FIT_STRETCH_LINEAR only the share of it
- * that falls with the square of the stretch. */
+/* A contact is elongated if log(longer width / shorter) exceeds FIT_STRETCH_LEAST, below which the cubes and spheres of a layer stay, and
+ * FIT_STRETCH_SURE standard deviations of the part from noise and gains, added in quadrature; where the dip is known, also a tail that is
+ * off by FIT_TAIL_ERROR of the peak, as wide as the dip. Widths are reported up to a standard deviation of FIT_STRETCH_SD_MAX and a ratio
+ * of exp(FIT_STRETCH_MAX), and from a sigma of FIT_SHAPE_LEAST pitches, below which the layer's own profile appears elongated. If it is
+ * elongated, the location's standard deviation contains the shift by separate widths, beyond a stretch of FIT_STRETCH_LINEAR only the share
+ * of it that falls with the square of the stretch. */
 #define FIT_STRETCH_LEAST 0.1f
 #define FIT_TAIL_ERROR 0.015f
 #define FIT_STRETCH_SURE 2.5f
@@ -86,8 +85,7 @@ static inline float fit_location_sd_limit_mm(const struct fit_settings *settings
 /* By the bits too: NaN and -0 are above the limits. */
 static inline bool fit_has_prior(const struct fit_settings *settings) {
   uint32_t least = bytes_from_f32(FIT_PRIOR_WIDTH_MIN_mm), most = bytes_from_f32(FIT_PRIOR_MAX_mm);
-  return bytes_from_f32(settings->prior_width_mm) - least <= most - least &&
-         bytes_from_f32(settings->prior_sigma_mm) <= most;
+  return bytes_from_f32(settings->prior_width_mm) - least <= most - least && bytes_from_f32(settings->prior_sigma_mm) <= most;
 }
 
 static inline bool fit_has_dip(const struct fit_settings *settings) {
@@ -97,15 +95,12 @@ static inline bool fit_has_dip(const struct fit_settings *settings) {
 }
 
 /* With so few iterations that the contact is not known before the last of them, the readings stay. */
-static inline bool fit_has_own(const struct fit_settings *settings) {
-  return settings->own && settings->iterations > FIT_OWN_ITERATIONS;
-}
+static inline bool fit_has_own(const struct fit_settings *settings) { return settings->own && settings->iterations > FIT_OWN_ITERATIONS; }
 
 /* Where sensors are far apart for the width, those beside the contact feel little but the dip. Then
  * it belongs into the derivatives; elsewhere it is enough to add it to the readings. */
 static inline bool fit_steps_want_dip(const struct fit_array *array, const struct fit_settings *settings) {
-  return fit_has_dip(settings) && fit_has_prior(settings) &&
-         settings->prior_sigma_mm < FIT_SHAPE_LEAST * array->pitch_mm;
+  return fit_has_dip(settings) && fit_has_prior(settings) && settings->prior_sigma_mm < FIT_SHAPE_LEAST * array->pitch_mm;
 }
 
 /* Whether the sensors are the rectangle of the build. */
@@ -128,10 +123,9 @@ static inline int32_t fit_reading(const struct fit_settings *settings, int32_t p
 
 /* Whether the fit without an outlier is the better one. rough: its residuals still are. An outlier above the others
  * takes the place of a narrow press, and makes others outliers. Then either fit may be the right one. */
-static inline bool fit_outlier_gone(const struct fit_settings *settings, const struct fit_result *with,
-                                    struct fit_result *without, bool rough, float pitch_mm) {
-  if (!(without->flags & CONTACT_FLAG_FIT_VALID) ||
-      !(without->residual_rms_Pa < FIT_OUTLIER_GAIN * with->residual_rms_Pa)) {
+static inline bool fit_outlier_gone(const struct fit_settings *settings, const struct fit_result *with, struct fit_result *without,
+                                    bool rough, float pitch_mm) {
+  if (!(without->flags & CONTACT_FLAG_FIT_VALID) || !(without->residual_rms_Pa < FIT_OUTLIER_GAIN * with->residual_rms_Pa)) {
     return false;
   }
   if (rough || without->sigma_mm < FIT_NARROW_SIGMA * pitch_mm) {

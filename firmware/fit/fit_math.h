@@ -4,8 +4,7 @@
 
 #include <stdint.h>
 
-/* 2^-z for z >= 0, relative error below 2^-23 beside the rounding of z itself; 0 for z >= 100.
- * A z that is negative or NaN counts as 0. */
+/* 2^-z for z >= 0, relative error below 2^-23 beside the rounding of z itself; 0 for z >= 100. A z that is negative or NaN counts as 0. */
 float fit_exp2_negative(float z);
 
 /* value 2^q, towards zero; what does not fit, and what is not finite, at most +-(2^31 - 1). A

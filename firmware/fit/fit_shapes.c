@@ -24,8 +24,7 @@ static int32_t place_q20(const struct fit_shapes_pad *pad, float mm) {
 }
 
 /* What a calibration knows of the pad. */
-static NOINLINE void set_known(const struct fit_array *array, const struct fit_settings *settings,
-                               struct fit_shapes_pad *pad) {
+static NOINLINE void set_known(const struct fit_array *array, const struct fit_settings *settings, struct fit_shapes_pad *pad) {
   struct fit_shapes_frame *frame = &pad->room.frame;
   frame->has_own = settings->own != NULL;
   for (int k = 0; frame->has_own && k < NODES; k++) {
@@ -39,10 +38,8 @@ static NOINLINE void set_known(const struct fit_array *array, const struct fit_s
   }
 }
 
-/* The models move and grow as the Gaussian does. Of what it is not the model, its place is unsure:
- * what that explains is no movement. */
-static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fit, struct fit_shapes_state *state,
-                   int32_t sum_q20) {
+/* The models move and grow as the Gaussian does. Of what it is not the model, its place is unsure: what that explains is no movement. */
+static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fit, struct fit_shapes_state *state, int32_t sum_q20) {
   int32_t x = place_q20(pad, fit->x_mm) - pad->origin_x_q20;
   int32_t y = place_q20(pad, fit->y_mm) - pad->origin_y_q20;
   if (state->frames > 0 && fit_is_another(sum_q20, state->sum_q20)) {
@@ -73,8 +70,7 @@ static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fi
   state->sum_q20 = sum_q20;
 }
 
-static void set_residuals(struct fit_shapes_pad *pad, int model, struct fit_shapes_state *state,
-                          struct priors *priors) {
+static void set_residuals(struct fit_shapes_pad *pad, int model, struct fit_shapes_state *state, struct priors *priors) {
   struct fit_shapes_equations *equations = &pad->room.equations[model];
   const bool early = model == LONG && state->frames < FIRST_WITH_FORCE;
   struct fit_shapes_at *at = &state->at[model];
@@ -100,8 +96,7 @@ static enum fit_shapes_progress forget(struct fit_shapes_state *state, struct fi
   return FIT_SHAPES_ANSWERED;
 }
 
-static enum fit_shapes_progress answer(const struct fit_shapes_pad *pad, struct fit_shapes_state *state,
-                                       struct fit_shapes_result *result) {
+static enum fit_shapes_progress answer(const struct fit_shapes_pad *pad, struct fit_shapes_state *state, struct fit_shapes_result *result) {
   int best = fit_shapes_best(pad, state->chi_square_q8, state->at);
   *result = (struct fit_shapes_result){0};
   for (int m = 0; m < MODELS; m++) {
@@ -124,8 +119,7 @@ static bool take(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   struct fit_base base;
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
       !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &readings) ||
-      fit_grid_weigh(array, settings, fit->used, &readings, 1 << 18, MODEL_SD_Q16, pad->room.weight_q12, &base) <
-          FIT_SHAPES_SENSORS ||
+      fit_grid_weigh(array, settings, fit->used, &readings, 1 << 18, MODEL_SD_Q16, pad->room.weight_q12, &base) < FIT_SHAPES_SENSORS ||
       base.base_q22 > BASE_MAX_Q22) {
     return false;
   }
@@ -137,9 +131,8 @@ static bool take(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   return true;
 }
 
-enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct fit_shapes_pad *pad,
-                                         const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                                         const struct fit_result *fit, struct fit_shapes_state *state,
+enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct fit_shapes_pad *pad, const int32_t *pressure_Pa_q10,
+                                         const struct fit_settings *settings, const struct fit_result *fit, struct fit_shapes_state *state,
                                          struct fit_shapes_result *result) {
   fit_use_rectangle(&array->grid);
   const bool first = state->part == 0;

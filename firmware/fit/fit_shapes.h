@@ -5,12 +5,11 @@
  *   round  one contact, under a tangential force or not
  *   long   one contact along a straight line, the same
  *   two    two contacts with forces of their own
- * Each takes one damped Gauss-Newton step a frame, from where the frame before ended, so the cost is fixed. A contact
- * at rest has its answer after FIT_SHAPES_FRAMES frames, and then in every other one, which does not step. A model with
- * more unknowns is chosen where it makes chi^2 + FIT_SHAPES_ERRORS less by a quarter; NUMERICS.md ("Contact shape") has
- * the models, the choice and its limits. ELONGATED is longer than round by the variance of a line of 0.9 pitches, and
- * explains twice as much as a pull: 97 % of limes, fingers and what else is as wide as that are not. What the other
- * models make of the place is part of location_sd_mm, by how likely they are.
+ * Each takes one damped Gauss-Newton step a frame, from where the frame before ended, so the cost is fixed. A contact at rest has its
+ * answer after FIT_SHAPES_FRAMES frames, and then in every other one, which does not step. A model with more unknowns is chosen where it
+ * makes chi^2 + FIT_SHAPES_ERRORS less by a quarter; NUMERICS.md ("Contact shape") has the models, the choice and its limits. ELONGATED is
+ * longer than round by the variance of a line of 0.9 pitches, and explains twice as much as a pull: 97 % of limes, fingers and what else is
+ * as wide as that are not. What the other models make of the place is part of location_sd_mm, by how likely they are.
  *
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors missing. No
  * recording of a real pad under two contacts is public: all figures are simulated (host_tools/report/two). */
@@ -31,8 +30,7 @@
 
 #define FIT_SHAPES_FRAMES 23
 
-/* That the errors are what is stated of them counts as this number of readings. Where chi^2 is above it, the model
- * itself may be wrong. */
+/* That the errors are what is stated of them counts as this number of readings. Where chi^2 is above it, the model itself may be wrong. */
 #define FIT_SHAPES_ERRORS 14
 
 enum fit_shape {
@@ -117,8 +115,7 @@ struct fit_shapes_pad {
  * is not valid, or narrower than this pitch can show: its narrowest normal term's variance must be
  * above FIT_SHAPES_VARIANCE_MIN pitches^2, which 9 mm and layers from 9 mm on have. */
 #define FIT_SHAPES_VARIANCE_MIN 0.08f
-enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array,
-                               const struct pad_profile *profile);
+enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array, const struct pad_profile *profile);
 
 /* Whether the result is of this frame. Where it is not, the one before remains: every other frame
  * only steps, and so do those of a contact's beginning. fit: of the same readings, whose gains act.
@@ -133,7 +130,6 @@ enum fit_shapes_progress {
   FIT_SHAPES_STEPPED,  /* the frame is done, and the result of one before remains */
   FIT_SHAPES_ANSWERED, /* the frame is done, and the result is of it */
 };
-enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct fit_shapes_pad *pad,
-                                         const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                                         const struct fit_result *fit, struct fit_shapes_state *state,
+enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct fit_shapes_pad *pad, const int32_t *pressure_Pa_q10,
+                                         const struct fit_settings *settings, const struct fit_result *fit, struct fit_shapes_state *state,
                                          struct fit_shapes_result *result);

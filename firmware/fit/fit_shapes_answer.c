@@ -39,8 +39,8 @@ static NOINLINE struct scaled variance_of_sum(const struct fit_shapes_equations 
   return fit_scaled_from(sum_q13, 2 * q - 30 - 13);
 }
 
-static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equations, int first, int32_t a_q20,
-                                          int second, int32_t b_q20) {
+static NOINLINE struct scaled variance_of(const struct fit_shapes_equations *equations, int first, int32_t a_q20, int second,
+                                          int32_t b_q20) {
   int32_t by_q20[UNKNOWNS] = {0};
   by_q20[first] = a_q20;
   by_q20[second] += b_q20;
@@ -51,9 +51,7 @@ static float mm(const struct fit_shapes_pad *pad, int32_t place_q20) {
   return fit_float(fixed_mul_q26(place_q20 * 8, pad->pitch_q22_mm), -19);
 }
 
-static float product_of(struct scaled a, struct scaled b) {
-  return fit_scaled_float(scaled_mul(fit_scaled_short(a), fit_scaled_short(b)));
-}
+static float product_of(struct scaled a, struct scaled b) { return fit_scaled_float(scaled_mul(fit_scaled_short(a), fit_scaled_short(b))); }
 
 /* unit: N of amplitude 1. variance: of a reading of weight 1. */
 struct scales {
@@ -66,15 +64,14 @@ static NOINLINE float sd_of(struct scaled scale, struct scaled form, struct scal
 
 static const struct scaled one = {1 << 14, -14};
 
-static NOINLINE void put_two(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations,
-                             const int32_t *at, const struct scales *scales, struct fit_shapes_result *result) {
+static NOINLINE void put_two(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations, const int32_t *at,
+                             const struct scales *scales, struct fit_shapes_result *result) {
   for (int c = 0; c < 2; c++) {
     int32_t sign = (c == 0) == (at[BALANCE] >= 0) ? 1 : -1;
     int32_t share_q20 = (ONE_Q20 + sign * at[BALANCE]) / 2;
     result->x_mm[c] = mm(pad, pad->origin_x_q20 + at[PLACE_X] + sign * at[SPAN_X]);
     result->y_mm[c] = mm(pad, pad->origin_y_q20 + at[PLACE_Y] + sign * at[SPAN_Y]);
-    result->force_N[c] =
-        product_of(scales->unit, scaled_mul(fit_scaled_from(at[AMPLITUDE], -20), fit_scaled_from(share_q20, -20)));
+    result->force_N[c] = product_of(scales->unit, scaled_mul(fit_scaled_from(at[AMPLITUDE], -20), fit_scaled_from(share_q20, -20)));
     struct scaled place = scaled_add(variance_of(equations, PLACE_X, ONE_Q20, SPAN_X, sign * ONE_Q20),
                                      variance_of(equations, PLACE_Y, ONE_Q20, SPAN_Y, sign * ONE_Q20));
     result->location_sd_mm[c] = sd_of(scales->pitch, place, scales->variance);
@@ -85,14 +82,14 @@ static NOINLINE void put_two(const struct fit_shapes_pad *pad, const struct fit_
 
 /* Of two unknowns behind one another. */
 static NOINLINE float sd_of_both(const struct fit_shapes_equations *equations, int first, const struct scales *scales) {
-  struct scaled both = scaled_add(variance_of(equations, first, ONE_Q20, first + 1, 0),
-                                  variance_of(equations, first + 1, ONE_Q20, first, 0));
+  struct scaled both =
+      scaled_add(variance_of(equations, first, ONE_Q20, first + 1, 0), variance_of(equations, first + 1, ONE_Q20, first, 0));
   return sd_of(one, both, scales->variance);
 }
 
 /* Along an edge the contact's variance is larger than across, by that of a line. */
-static NOINLINE bool is_edge(const struct fit_shapes_equations *equations, const struct fit_shapes_at *at,
-                             const struct scales *scales, float pull_sd) {
+static NOINLINE bool is_edge(const struct fit_shapes_equations *equations, const struct fit_shapes_at *at, const struct scales *scales,
+                             float pull_sd) {
   int32_t more_q20 = fixed_mul_16(fit_shapes_span_square(at->value), THIRD_Q16) - at->value[SPREAD];
   int32_t by_q20[UNKNOWNS] = {[SPREAD] = -ONE_Q20};
   by_q20[SPAN_X] = 2 * fixed_mul_16(at->value[SPAN_X], THIRD_Q16);
@@ -101,21 +98,20 @@ static NOINLINE bool is_edge(const struct fit_shapes_equations *equations, const
   return fit_float(more_q20 - LEAST_VARIANCE_Q20, -20) > EDGE_SURE * fit_quadrature(1.0f, sd, 1.0f, pull_sd);
 }
 
-static NOINLINE void put_edge(const struct fit_shapes_equations *equations, const int32_t *at,
-                              const struct scales *scales, float pull_sd, struct fit_shapes_result *result) {
+static NOINLINE void put_edge(const struct fit_shapes_equations *equations, const int32_t *at, const struct scales *scales, float pull_sd,
+                              struct fit_shapes_result *result) {
   float x = fit_float(at[SPAN_X], -20), y = fit_float(at[SPAN_Y], -20);
   float reach = fit_quadrature(1.0f, fabsf(x), 1.0f, fabsf(y)), per = 1.0f / reach, along = x < 0.0f ? -per : per;
   result->length_mm = 2.0f * fit_scaled_float(scales->pitch) * reach;
   result->along_x = along * x;
   result->along_y = along * y;
-  struct scaled across =
-      variance_of(equations, SPAN_X, fit_fixed(-result->along_y, 20), SPAN_Y, fit_fixed(result->along_x, 20));
+  struct scaled across = variance_of(equations, SPAN_X, fit_fixed(-result->along_y, 20), SPAN_Y, fit_fixed(result->along_x, 20));
   result->angle_sd_rad = fit_quadrature(per, sd_of(one, across, scales->variance), 3.0f * per * per, pull_sd);
 }
 
 /* Of one contact: whether it is long, or else pulled. */
-static NOINLINE void put_kind(const struct fit_shapes_equations *equations, const struct fit_shapes_at *at,
-                              bool is_long, const struct scales *scales, struct fit_shapes_result *result) {
+static NOINLINE void put_kind(const struct fit_shapes_equations *equations, const struct fit_shapes_at *at, bool is_long,
+                              const struct scales *scales, struct fit_shapes_result *result) {
   const int pull = equations->pull;
   float x = fit_float(at->value[pull], -20), y = fit_float(at->value[pull + 1], -20);
   float size = fit_quadrature(1.0f, fabsf(x), 1.0f, fabsf(y)), unit_N = fit_scaled_float(scales->unit);
@@ -132,8 +128,8 @@ static NOINLINE void put_kind(const struct fit_shapes_equations *equations, cons
   result->qy_N = unit_N * y;
 }
 
-static NOINLINE void put_one(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations,
-                             const int32_t *at, const struct scales *scales, struct fit_shapes_result *result) {
+static NOINLINE void put_one(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations, const int32_t *at,
+                             const struct scales *scales, struct fit_shapes_result *result) {
   result->x_mm[0] = mm(pad, pad->origin_x_q20 + at[PLACE_X]);
   result->y_mm[0] = mm(pad, pad->origin_y_q20 + at[PLACE_Y]);
   result->force_N[0] = product_of(scales->unit, fit_scaled_from(at[AMPLITUDE], -20));
@@ -153,9 +149,8 @@ static bool explains_as_well(int32_t chi_square_q8, int32_t than_q8) {
   return chi_square_q8 - than_q8 < (than_q8 + (FIT_SHAPES_ERRORS << 8)) >> 3;
 }
 
-/* Two contacts are apart and do not overlap, and both are on the array or hardly beside it. A pair
- * that is otherwise explains a wide contact, or what the models of a pull are off by. Of squares,
- * discs (4) and balls (5), squares of the same spread overlap last. */
+/* Two contacts are apart and do not overlap, and both are on the array or hardly beside it. A pair that is otherwise explains a wide
+ * contact, or what the models of a pull are off by. Of squares, discs (4) and balls (5), squares of the same spread overlap last. */
 static bool can_be_two(const struct fit_shapes_at *pair) {
   const int32_t *at = pair->value, square_q20 = fit_shapes_span_square(at);
   int32_t reach_x = (int32_t)(fixed_size(at[PLACE_X]) + fixed_size(at[SPAN_X]));
@@ -186,16 +181,15 @@ static void put_middle(int model, const int32_t *at, int32_t middle_q20[2]) {
 
 /* The other models may be right: how far their middles are, by how likely they are, adds to the errors of the places.
  * Where chi^2 is above FIT_SHAPES_ERRORS none of the models may be, and the errors grow with it. */
-static void doubt_places(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
-                         const struct fit_shapes_state *state, struct fit_shapes_result *result) {
+static void doubt_places(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8, const struct fit_shapes_state *state,
+                         struct fit_shapes_result *result) {
   float total = 1.0f, square_mm2[2] = {0.0f, 0.0f};
   for (int m = 0; m < MODELS; m++) {
     int32_t middle_q20[2];
     if (m == best) {
       continue;
     }
-    float likely = fit_float(chi_square_q8[best] + (FIT_SHAPES_ERRORS << 8), 0) /
-                   fit_float(chi_square_q8[m] + (FIT_SHAPES_ERRORS << 8), 0);
+    float likely = fit_float(chi_square_q8[best] + (FIT_SHAPES_ERRORS << 8), 0) / fit_float(chi_square_q8[m] + (FIT_SHAPES_ERRORS << 8), 0);
     /* Where the scale of the errors is unknown, the likelihood of n readings falls as chi^2 to the power n / 2. For
      * fifteen that is the eighth, nearly. */
     likely *= likely;
@@ -216,8 +210,8 @@ static void doubt_places(const struct fit_shapes_pad *pad, int best, const int32
   }
 }
 
-void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
-                         const struct fit_shapes_state *state, struct fit_shapes_result *result) {
+void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8, const struct fit_shapes_state *state,
+                         struct fit_shapes_result *result) {
   const struct fit_shapes_equations *equations = &pad->room.equations[best];
   const struct fit_shapes_at *at = &state->at[best];
   struct scaled base = fit_scaled_from(pad->room.frame.base_q22, -22);

@@ -66,8 +66,7 @@ static NOINLINE int32_t residuals_at(struct fit_shapes_pad *pad, struct fit_shap
   return sum_q16;
 }
 
-void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, int part,
-                      struct fit_shapes_state *state) {
+void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, int part, struct fit_shapes_state *state) {
   const float per = pad->per_pitch;
   struct fit_shapes_at at = {{0}};
   float variance = fit->sigma_mm * fit->sigma_mm * per * per;

@@ -18,13 +18,12 @@ struct blob {
 
 static int32_t q26_from(float value) { return fit_fixed(value, 26); }
 
-enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array,
-                               const struct pad_profile *profile) {
+enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array, const struct pad_profile *profile) {
   const float per = 1.0f / array->pitch_mm, per_square = per * per;
   const float widest = profile->normal[PAD_NORMAL_TERMS - 1].sd_mm * per;
   const float narrowest = profile->normal[0].sd_mm * per;
-  if (!fit_is_rectangle(array) || !pad_profile_is_valid(profile) || narrowest * narrowest < FIT_SHAPES_VARIANCE_MIN ||
-      widest > 1.5f || profile->tangential[PAD_TANGENTIAL_TERMS - 1].sd_mm * per > 4.0f) {
+  if (!fit_is_rectangle(array) || !pad_profile_is_valid(profile) || narrowest * narrowest < FIT_SHAPES_VARIANCE_MIN || widest > 1.5f ||
+      profile->tangential[PAD_TANGENTIAL_TERMS - 1].sd_mm * per > 4.0f) {
     return FT_ERR_ARGUMENT;
   }
   const float V = widest * widest;
@@ -115,8 +114,7 @@ void fit_shapes_set_squares(int32_t x_q12, int32_t y_q12, struct squares *square
   }
 }
 
-FIXED_INLINE void set_bell(const struct squares *squares, int32_t k_q24, int32_t (*power)(uint32_t),
-                           struct bell *bell) {
+FIXED_INLINE void set_bell(const struct squares *squares, int32_t k_q24, int32_t (*power)(uint32_t), struct bell *bell) {
   for (int i = 0; i < COLUMNS; i++) {
     bell->x_q15[i] = power((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24)) >> 15;
   }
@@ -125,9 +123,7 @@ FIXED_INLINE void set_bell(const struct squares *squares, int32_t k_q24, int32_t
   }
 }
 
-void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell) {
-  set_bell(squares, k_q24, exp2_negative, bell);
-}
+void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell) { set_bell(squares, k_q24, exp2_negative, bell); }
 
 /* The same within 0.6 %, for what is little. */
 static NOINLINE void set_rough_bell(const struct squares *squares, int32_t k_q24, struct bell *bell) {
@@ -274,8 +270,8 @@ void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count, const
     int32_t residual = row[RESIDUAL];
     if (pad->room.frame.has_own) { /* what a sensor reads that is off its place */
       const struct fit_own *own = &pad->room.own[k];
-      residual = fixed_plus(residual, fixed_plus(fixed_times(row[PLACE_X] >> 2, own->off_x_q15),
-                                                 fixed_times(row[PLACE_Y] >> 2, own->off_y_q15)));
+      residual =
+          fixed_plus(residual, fixed_plus(fixed_times(row[PLACE_X] >> 2, own->off_x_q15), fixed_times(row[PLACE_Y] >> 2, own->off_y_q15)));
     }
     residual = fixed_clamp(residual >> 12, -(1 << 17), 1 << 17) * pad->room.weight_q12[k];
     row[RESIDUAL] = residual;

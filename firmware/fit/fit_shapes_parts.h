@@ -4,8 +4,7 @@
  *   s = sum_j share_j V / v_j exp(-d' d / (2 v_j)) - dip,    v_j = V_j + t,  V the widest V_j
  * and what of a tangential force Q the rubber shows there:
  *   f = sum_j moment_j V / v_j^2 d exp(-d' d / (2 v_j)),     v_j = V_j + 1.3 t
- * A model is A sum_b w_b [s(d_b) + far exp(-d_b' d_b / (2 FAR V))] + pull' f(d): blobs of weight
- * w_b by lever_b span from the middle.
+ * A model is A sum_b w_b [s(d_b) + far exp(-d_b' d_b / (2 FAR V))] + pull' f(d): blobs of weight w_b by lever_b span from the middle.
  *   round  one blob, and what pulls it in the place of the span
  *   long   four, the nodes of Gauss's quadrature of a line from -span to span
  *   two    two, by +-span, of weight (1 +- balance) / 2
@@ -77,8 +76,7 @@ static inline int32_t fit_shapes_span_square(const int32_t *at) {
 
 /* fit_shapes_begin.c. A pair has four starts, of which two are tried in each of two parts. */
 #define BEGIN_PARTS 2
-void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, int part,
-                      struct fit_shapes_state *state);
+void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, int part, struct fit_shapes_state *state);
 
 /* fit_shapes_step.c. The column of the residuals, and the sum of the squares with those of the priors; chi^2 of both,
  * Q8; and after these, of the model's rows, one damped step, or the factors of the matrix that answers. */
@@ -86,10 +84,9 @@ void fit_shapes_form_residuals(struct fit_shapes_pad *pad, const int32_t *at, st
                                struct fit_shapes_equations *equations);
 int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations);
 void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors *priors, struct fit_shapes_at *at);
-void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct priors *priors,
-                          const struct fit_shapes_at *at);
+void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct priors *priors, const struct fit_shapes_at *at);
 
 /* fit_shapes_answer.c. at: where each model is. */
 int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8, const struct fit_shapes_at *at);
-void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
-                         const struct fit_shapes_state *state, struct fit_shapes_result *result);
+void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8, const struct fit_shapes_state *state,
+                         struct fit_shapes_result *result);

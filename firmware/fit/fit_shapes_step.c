@@ -35,8 +35,7 @@ static NOINLINE int32_t put_column(struct fit_shapes_pad *pad, int u) {
 }
 
 /* The same of the residuals, as many bits as there are. */
-static NOINLINE int32_t put_residuals(struct fit_shapes_pad *pad, uint32_t size,
-                                      struct fit_shapes_equations *equations) {
+static NOINLINE int32_t put_residuals(struct fit_shapes_pad *pad, uint32_t size, struct fit_shapes_equations *equations) {
   int32_t shift = fixed_bits(size) - COLUMN_BITS;
   shift = shift < 1 ? 1 : shift;
   equations->q[RESIDUAL] = (int8_t)(28 - shift);
@@ -97,8 +96,7 @@ void fit_shapes_form_residuals(struct fit_shapes_pad *pad, const int32_t *at, st
 }
 
 /* The normal matrix, of which the diagonal is 2^28 to 2^30. */
-static NOINLINE void form(struct fit_shapes_pad *pad, const struct priors *priors,
-                          struct fit_shapes_equations *equations) {
+static NOINLINE void form(struct fit_shapes_pad *pad, const struct priors *priors, struct fit_shapes_equations *equations) {
   int8_t up[UNKNOWNS] = {0};
   for (int u = 0; u < equations->count; u++) {
     int32_t prior = priors->element_q27[u] >> COLUMN_SHIFT;
@@ -153,11 +151,9 @@ static NOINLINE void substitute(const struct fit_shapes_equations *equations, co
   }
 }
 
-static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model,
-                               const struct fit_shapes_equations *equations, const int32_t *x_q20,
-                               struct fit_shapes_at *at) {
-  const int32_t limit_of[UNKNOWNS] = {AMPLITUDE_MAX, PLACE_X_MAX, PLACE_Y_MAX, 0, ONE_Q20 / 8,
-                                      SPAN_MAX,      SPAN_MAX,    0,           0};
+static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model, const struct fit_shapes_equations *equations,
+                               const int32_t *x_q20, struct fit_shapes_at *at) {
+  const int32_t limit_of[UNKNOWNS] = {AMPLITUDE_MAX, PLACE_X_MAX, PLACE_Y_MAX, 0, ONE_Q20 / 8, SPAN_MAX, SPAN_MAX, 0, 0};
   int32_t move[UNKNOWNS], most_q14 = 1 << 14;
   int32_t amplitude = at->value[AMPLITUDE];
   for (int u = 0; u < equations->count; u++) {
@@ -212,8 +208,8 @@ static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equa
 }
 
 /* Factors of the damped matrix; right: of the step that it asks for. */
-static NOINLINE void factorise(struct fit_shapes_equations *equations, int32_t spread, const struct fit_shapes_pad *pad,
-                               int damping_shift, int32_t *right) {
+static NOINLINE void factorise(struct fit_shapes_equations *equations, int32_t spread, const struct fit_shapes_pad *pad, int damping_shift,
+                               int32_t *right) {
   hold_spread(pad, equations, spread);
   for (int u = 0; u < equations->count; u++) {
     right[u] = equations->right[u];
@@ -231,8 +227,7 @@ void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors 
   take_step(pad, model, equations, x_q20, at);
 }
 
-void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct priors *priors,
-                          const struct fit_shapes_at *at) {
+void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct priors *priors, const struct fit_shapes_at *at) {
   struct fit_shapes_equations *equations = &pad->room.equations[model];
   int32_t right[UNKNOWNS];
   form(pad, priors, equations);

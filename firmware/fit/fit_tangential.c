@@ -41,8 +41,7 @@
 #define GAUSSIAN_VARIANCE_Q26 15300821 /* of the Gaussian that fits a point contact: 0.912 V0 */
 #define GAUSSIAN_FORCE 1.0753f         /* its 2 pi p0 sigma^2 over the force */
 
-/* Only a step of at most 0.2 of the longest is reported, since the estimate is off by some 0.1 mm after a longer one.
- */
+/* Only a step of at most 0.2 of the longest is reported, since the estimate is off by some 0.1 mm after a longer one. */
 #define STEPS_REPORTED 2
 #define LENGTH_REPORTED_Q14 3277
 #define JUMP_Q26 (ONE_Q26 / 2)
@@ -66,8 +65,7 @@ static int32_t q26_from(float value) { return (int32_t)(value * 67108864.0f); }
 #define UNIT_MAX_mm 19.5f
 #define FORCE_UNIT_Q 40 /* 2^25 .. 2^30 */
 
-/* Whether the sums over these terms of strength V0 / v^i, i from first, stay below their limits for
- * the most concentrated contact. */
+/* Whether the sums over these terms of strength V0 / v^i, i from first, stay below their limits for the most concentrated contact. */
 static bool is_carried(const struct fit_pad *pad, int from, int end, float t, bool pulls) {
   float sums[3] = {0.0f, 0.0f, 0.0f};
   for (int j = from; j < end; j++) {
@@ -122,8 +120,7 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, 
   }
   pad->height_q26 = q26_from(height);
   float least = (float)spread_least(pad) * (1.0f / 67108864.0f);
-  if (!is_carried(pad, 0, PAD_NORMAL_TERMS, least, false) ||
-      !is_carried(pad, PAD_NORMAL_TERMS, FIT_TANGENTIAL_TERMS, 1.3f * least, true)) {
+  if (!is_carried(pad, 0, PAD_NORMAL_TERMS, least, false) || !is_carried(pad, PAD_NORMAL_TERMS, FIT_TANGENTIAL_TERMS, 1.3f * least, true)) {
     return FT_ERR_ARGUMENT;
   }
   float force_unit_N = 1.57079633e-6f * unit_mm * unit_mm; /* 2 pi V0, V0 = 1/4 */
@@ -139,10 +136,10 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, 
 }
 
 /* False: too few sensors. */
-static bool weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used,
-                  struct problem *problem, struct fit_tangential_room *room) {
-  int sensors = fit_grid_weigh(array, settings, used, &problem->readings, ONE_Q26 >> 5, problem->model_sd_q16,
-                               room->weight_q12, &problem->base);
+static bool weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used, struct problem *problem,
+                  struct fit_tangential_room *room) {
+  int sensors =
+      fit_grid_weigh(array, settings, used, &problem->readings, ONE_Q26 >> 5, problem->model_sd_q16, room->weight_q12, &problem->base);
   problem->by_gains_q12 = sensors > 0 ? (1 << 12) - port_divide(problem->base.squares_q12, sensors) : 0;
   return sensors >= FIT_TANGENTIAL_SENSORS;
 }
@@ -156,8 +153,7 @@ NOINLINE static void set_from_fit(const struct fit_pad *pad, const struct fit_re
   at->y_q26 = fixed_clamp(at->y_q26, -reach(pad, ROWS), reach(pad, ROWS));
   int32_t sigma_q26 = product(fit_fixed(fit->sigma_mm, 24), pad->per_unit_q30, 28);
   sigma_q26 = fixed_clamp(sigma_q26, 0, 2 * ONE_Q26);
-  at->t_q26 =
-      fixed_clamp(fixed_mul_q26(sigma_q26, sigma_q26) - GAUSSIAN_VARIANCE_Q26, spread_least(pad), SPREAD_MOST_Q26);
+  at->t_q26 = fixed_clamp(fixed_mul_q26(sigma_q26, sigma_q26) - GAUSSIAN_VARIANCE_Q26, spread_least(pad), SPREAD_MOST_Q26);
   at->e1_q26 = at->e2_q26 = at->pull_x_q24 = at->pull_y_q24 = 0;
   struct scaled amplitude = scaled_mul(fit_grid_scaled(fit->force_N), pad->per_force);
   amplitude.exponent += shift - 18;
@@ -173,8 +169,8 @@ static int32_t in_proportion(int32_t value, int32_t share_q13, int32_t most) {
 
 /* Where the estimate begins: at the Gaussian's, or where the last frame's ended, moved as the
  * Gaussian has moved, unless its noise may have done that, and in proportion to the readings. */
-NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_state *state,
-                           const struct fit_tangential_unknowns *fit, int32_t noise_q26, int32_t sum_q20) {
+NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_state *state, const struct fit_tangential_unknowns *fit,
+                           int32_t noise_q26, int32_t sum_q20) {
   struct fit_tangential_unknowns *at = &state->at;
   int32_t before = state->sum_q20;
   int32_t dx_q26 = fit->x_q26 - state->fit_x_q26, dy_q26 = fit->y_q26 - state->fit_y_q26;
@@ -235,23 +231,21 @@ static struct scaled variance_of(const struct fit_tangential_room *room, const s
 /* How far the place moves for a change of Q / F along the same axis, if the other unknowns follow:
  * from its row of the inverse of L, 2^half of it. length: with the amplitude. */
 static int32_t moved_q20(const struct outcome *outcome, struct scaled length, int axis, int32_t with_pull_q8) {
-  int32_t q =
-      outcome->column_q[PLACE_X + axis] - outcome->column_q[PULL_X + axis] - outcome->solution.half[PULL_X + axis] - 8;
+  int32_t q = outcome->column_q[PLACE_X + axis] - outcome->column_q[PULL_X + axis] - outcome->solution.half[PULL_X + axis] - 8;
   return shifted(with_pull_q8 * length.mantissa, q + length.exponent + 20);
 }
 
 static bool exceeds(struct scaled a, struct scaled b) { return scaled_sub(a, b).mantissa > 0; }
 
 /* square: e1^2 + e2^2; round: A v. variance: of a reading of weight 1. */
-static bool is_elongated(const struct fit_tangential_room *room, const struct outcome *outcome, struct scaled square,
-                         struct scaled round, struct scaled variance) {
+static bool is_elongated(const struct fit_tangential_room *room, const struct outcome *outcome, struct scaled square, struct scaled round,
+                         struct scaled variance) {
   const struct scaled least = {(int32_t)(ELONGATED_LEAST * ELONGATED_LEAST * 8388608.0f), -23};
   if (!exceeds(square, scaled_mul(least, scaled_mul(round, round)))) {
     return false;
   }
   const struct scaled sure = {(int32_t)(ELONGATED_SURE * ELONGATED_SURE * 2048.0f), -12};
-  struct scaled twice =
-      scaled_add(variance_of(room, outcome, STRETCH, 0, NULL), variance_of(room, outcome, SLANT, 0, NULL));
+  struct scaled twice = scaled_add(variance_of(room, outcome, STRETCH, 0, NULL), variance_of(room, outcome, SLANT, 0, NULL));
   return exceeds(square, scaled_mul(sure, scaled_mul(twice, variance)));
 }
 
@@ -266,8 +260,8 @@ static struct scaled misfit_factor(const struct problem *problem, int32_t misfit
   return fit_scaled_from(misfit_q16, -16);
 }
 
-NOINLINE static void conclude(const struct problem *problem, const struct fit_tangential_unknowns *at,
-                              const struct outcome *outcome, struct fit_tangential *result) {
+NOINLINE static void conclude(const struct problem *problem, const struct fit_tangential_unknowns *at, const struct outcome *outcome,
+                              struct fit_tangential *result) {
   const struct fit_pad *pad = problem->pad;
   const struct fit_tangential_room *room = &pad->room;
   struct scaled base = fit_scaled_from(problem->base.base_q22, -22);
@@ -286,18 +280,15 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
     return;
   }
   const struct scaled stated = scaled_mul(variance, pad->thin);
-  struct scaled pull_variance =
-      scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PULL, GAINS_SHIFT_PULL));
+  struct scaled pull_variance = scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PULL, GAINS_SHIFT_PULL));
   pull_variance = fit_scaled_short(pull_variance);
   const int gains_shift = problem->own ? GAINS_SHIFT_CALIBRATED : 0;
   variance = scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PLACE, gains_shift));
   variance = fit_scaled_short(variance);
   int32_t x_q8, y_q8;
-  struct scaled pulls =
-      scaled_add(variance_of(room, outcome, PULL_X, 0, NULL), variance_of(room, outcome, PULL_Y, 0, NULL));
+  struct scaled pulls = scaled_add(variance_of(room, outcome, PULL_X, 0, NULL), variance_of(room, outcome, PULL_Y, 0, NULL));
   pulls.exponent -= 1;
-  struct scaled place = scaled_add(variance_of(room, outcome, PLACE_X, PULL_X, &x_q8),
-                                   variance_of(room, outcome, PLACE_Y, PULL_Y, &y_q8));
+  struct scaled place = scaled_add(variance_of(room, outcome, PLACE_X, PULL_X, &x_q8), variance_of(room, outcome, PLACE_Y, PULL_Y, &y_q8));
   struct scaled pull_sd = root_of_product(pulls, pull_variance);
   const struct scaled most = {(int32_t)(FIT_TANGENTIAL_SD_MAX * 32768.0f), -15};
   if (exceeds(pull_sd, scaled_mul(most, amplitude))) {
@@ -348,8 +339,8 @@ static int32_t prior_row(int32_t base_q22, int32_t sd_q26) {
 }
 
 void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,
-                             const struct fit_settings *settings, const struct fit_result *fit,
-                             struct fit_tangential_state *state, struct fit_tangential *result) {
+                             const struct fit_settings *settings, const struct fit_result *fit, struct fit_tangential_state *state,
+                             struct fit_tangential *result) {
   fit_use_rectangle(&array->grid);
   *result = (struct fit_tangential){0};
   struct problem problem;
@@ -366,8 +357,7 @@ void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad,
   struct fit_tangential_unknowns of_fit;
   struct outcome outcome;
   set_from_fit(pad, fit, problem.readings.shift, &of_fit);
-  begin(pad, state, &of_fit,
-        product(fixed_clamp(fit_fixed(fit->location_noise_mm, 24), 0, 1 << 28), pad->per_unit_q30, 28),
+  begin(pad, state, &of_fit, product(fixed_clamp(fit_fixed(fit->location_noise_mm, 24), 0, 1 << 28), pad->per_unit_q30, 28),
         fit_grid_sum_q20(problem.readings.q28));
   int32_t long_sd_q26 = fixed_mul_q28(of_fit.amplitude_q24 * 4, pad->long_sd_q26) * 4;
   problem.spread_prior_q26 = prior_row(problem.base.base_q22, pad->spread_sd_q26);

@@ -95,7 +95,7 @@ struct fit_tangential {
   int32_t moved_q20_mm[2];                 /* how far along x the place would lie elsewhere if qx / force were larger
                                               by 1, and along y of qy; what moves across is a tenth of that */
   float place_per_pull;                    /* by what more than q_sd_N the misfit has widened location_sd_mm */
-  bool elongated; /* the contact is not round, whatever the Gaussian makes of its tangential force */
+  bool elongated;                          /* the contact is not round, whatever the Gaussian makes of its tangential force */
 };
 
 /* A contact at rest is at its optimum after this number of frames. */
@@ -108,5 +108,5 @@ struct fit_tangential {
 #define FIT_TANGENTIAL_SENSORS 8
 #define FIT_TANGENTIAL_SD_MAX 0.2f
 void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad, const int32_t *pressure_Pa_q10,
-                             const struct fit_settings *settings, const struct fit_result *fit,
-                             struct fit_tangential_state *state, struct fit_tangential *result);
+                             const struct fit_settings *settings, const struct fit_result *fit, struct fit_tangential_state *state,
+                             struct fit_tangential *result);

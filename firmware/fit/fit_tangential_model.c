@@ -19,8 +19,7 @@ struct offset {
   int32_t along_x_q17, along_y_q17; /* in x e1 d and e2 d, in y e2 d and -e1 d */
 };
 
-FIXED_INLINE void set_offset(int32_t d_q12, int32_t pull_q13, int32_t e1_q17, int32_t by_x_q17, int32_t by_y_q17,
-                             struct offset *off) {
+FIXED_INLINE void set_offset(int32_t d_q12, int32_t pull_q13, int32_t e1_q17, int32_t by_x_q17, int32_t by_y_q17, struct offset *off) {
   off->d_q12 = d_q12;
   off->half_square_q24 = (d_q12 * d_q12) >> 1;
   off->pulled_q25 = d_q12 * pull_q13;
@@ -45,8 +44,8 @@ struct parabola {
 
 #define Z_LEAST_Q22 16 /* rounding takes no exponent below zero */
 
-FIXED_INLINE void set_axis(int32_t bend, int32_t by_square, int32_t nodes, const struct parabola *axis,
-                           int32_t (*power)(uint32_t), int down, int32_t *value) {
+FIXED_INLINE void set_axis(int32_t bend, int32_t by_square, int32_t nodes, const struct parabola *axis, int32_t (*power)(uint32_t),
+                           int down, int32_t *value) {
   uint32_t at_origin = (uint32_t)fixed_mul_q26(bend, axis->square_q26) + Z_LEAST_Q22;
   int32_t slope = fixed_mul_q26(bend, axis->by_pitch_q26) * 2;
   for (int32_t k = 0, i = -(nodes / 2); k < nodes; k++, i++) {
@@ -54,18 +53,16 @@ FIXED_INLINE void set_axis(int32_t bend, int32_t by_square, int32_t nodes, const
   }
 }
 
-NOINLINE static void set_exponentials(int32_t bend_q26, int32_t by_square, int32_t nodes, const struct parabola *axis,
-                                      int32_t *value_q30) {
+NOINLINE static void set_exponentials(int32_t bend_q26, int32_t by_square, int32_t nodes, const struct parabola *axis, int32_t *value_q30) {
   set_axis(bend_q26, by_square, nodes, axis, exp2_negative, 0, value_q30);
 }
 
 #define LEAST_VARIANCE_Q26 (ONE_Q26 / 16)
 
-NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26, const struct parabola *axes,
-                              struct term *term) {
+NOINLINE static void set_term(const struct fit_pad *pad, int j, int32_t t_q26, const struct parabola *axes, struct term *term) {
   int32_t v = pad->variance_q26[j] + t_q26;
   int32_t inverse_q22 = fixed_div_q26(1 << 22, v < LEAST_VARIANCE_Q26 ? LEAST_VARIANCE_Q26 : v); /* 1 / v */
-  int32_t height_q24 = fixed_mul_q26(inverse_q22, pad->strength_q26[j]); /* V0 / v of it, V0 1/4 */
+  int32_t height_q24 = fixed_mul_q26(inverse_q22, pad->strength_q26[j]);                         /* V0 / v of it, V0 1/4 */
   if (j >= PAD_NORMAL_TERMS) {
     height_q24 = fixed_mul_q26(height_q24, inverse_q22) * 16; /* moment V0 / v^2 */
   }
@@ -102,8 +99,7 @@ NOINLINE static void set_terms(const struct problem *problem, const struct term 
       f0_q28 += w_q28;
       found->tangential_q28[j] = scaled_by(w_q28, weight_q12, 12);
     }
-    int32_t model_q24 =
-        (scaled_by(s0_q28, amplitude_q13, 16) >> 1) + whole_product(x->pulled_q25 + y->pulled_q25, f0_q28 * 2, 30);
+    int32_t model_q24 = (scaled_by(s0_q28, amplitude_q13, 16) >> 1) + whole_product(x->pulled_q25 + y->pulled_q25, f0_q28 * 2, 30);
     room->residual[n] = scaled_by((problem->readings.q28[n] >> 4) - model_q24, weight_q12, 12);
   }
 }
@@ -144,8 +140,7 @@ NOINLINE static void set_sums(const struct term *terms, union fit_tangential_nod
 }
 
 /* The dip's Gaussian along an axis within 0.3 %. */
-NOINLINE static void set_dip_axis(int32_t bend_q22, int32_t by_square, int32_t nodes, const struct parabola *axis,
-                                  int32_t *value_q15) {
+NOINLINE static void set_dip_axis(int32_t bend_q22, int32_t by_square, int32_t nodes, const struct parabola *axis, int32_t *value_q15) {
   set_axis(bend_q22, by_square, nodes, axis, exp2_rough, 15, value_q15);
 }
 
@@ -153,8 +148,8 @@ NOINLINE static void set_dip_axis(int32_t bend_q22, int32_t by_square, int32_t n
 
 /* Takes the dip from the model: one more term, which a contact's own spread widens as the others. What is long in the
  * contact does without. */
-NOINLINE static void take_dip(const struct problem *problem, int32_t t_q26, const struct parabola *axes,
-                              int32_t amplitude_q13, struct fit_tangential_room *room) {
+NOINLINE static void take_dip(const struct problem *problem, int32_t t_q26, const struct parabola *axes, int32_t amplitude_q13,
+                              struct fit_tangential_room *room) {
   int32_t x_q15[MOST_COLUMNS], y_q15[MOST_ROWS];
   int32_t v = problem->dip_variance_q26 + t_q26;
   int32_t inverse_q26 = fixed_div_q26(ONE_Q26, v < DIP_VARIANCE_LEAST_Q26 ? DIP_VARIANCE_LEAST_Q26 : v); /* 1 / v */
@@ -181,14 +176,13 @@ NOINLINE static void take_dip(const struct problem *problem, int32_t t_q26, cons
   }
 }
 
-/* Ends the residuals of five nodes and sets their columns of the place and the spread. With
- * d = (dx, dy), r2 = d' d and b = Bx dx + By dy:
+/* Ends the residuals of five nodes and sets their columns of the place and the spread. With d = (dx, dy), r2 = d' d and b = Bx dx + By dy:
  *   m     = A s0 + P s2 + b f0,     P = e1 (dx^2 - dy^2) / 2 + e2 dx dy
  *   dm/dx = dx (A s1 + P s3 + b f1) - (e1 dx + e2 dy) s2 - Bx f0
  *   dm/dt = r2 / 2 (A s2 + P s4 + KAPPA b f2) - (A s1 + 3 P s3 + 2 KAPPA b f1)
  * (e1 and e2 with the amplitude in them). */
-NOINLINE static void set_moving(const struct offset *x, const struct offset *y, const struct origin *at,
-                                union fit_tangential_node *node, int32_t *residual) {
+NOINLINE static void set_moving(const struct offset *x, const struct offset *y, const struct origin *at, union fit_tangential_node *node,
+                                int32_t *residual) {
   const union fit_tangential_node *end = node + ROWS;
   do {
     int32_t longer_q26 = x->longer_q26 - y->longer_q26 + scaled_by(x->d_q12 * y->d_q12, at->e2_q17, 15);
@@ -250,25 +244,21 @@ NOINLINE static void set_still(const struct offset *x, const struct offset *y, u
   } while (++node != end);
 }
 
-void fit_tangential_linearise(const struct problem *problem, const struct fit_tangential_unknowns *at,
-                              struct fit_tangential_room *room) {
+void fit_tangential_linearise(const struct problem *problem, const struct fit_tangential_unknowns *at, struct fit_tangential_room *room) {
   const struct fit_pad *pad = problem->pad;
   struct offset off_x[MOST_COLUMNS], off_y[MOST_ROWS];
   struct term terms[FIT_TANGENTIAL_TERMS];
   const struct parabola axes[2] = {{fixed_mul_q26(at->x_q26, at->x_q26), fixed_mul_q26(at->x_q26, pad->pitch_q26)},
                                    {fixed_mul_q26(at->y_q26, at->y_q26), fixed_mul_q26(at->y_q26, pad->pitch_q26)}};
-  const struct origin origin = {at->x_q26 >> (26 - PLACE_Q),          at->y_q26 >> (26 - PLACE_Q),
-                                at->amplitude_q24 >> (24 - HEIGHT_Q), at->pull_x_q24 >> (24 - HEIGHT_Q),
-                                at->pull_y_q24 >> (24 - HEIGHT_Q),    at->e1_q26 >> (26 - LONG_Q),
+  const struct origin origin = {at->x_q26 >> (26 - PLACE_Q),       at->y_q26 >> (26 - PLACE_Q),       at->amplitude_q24 >> (24 - HEIGHT_Q),
+                                at->pull_x_q24 >> (24 - HEIGHT_Q), at->pull_y_q24 >> (24 - HEIGHT_Q), at->e1_q26 >> (26 - LONG_Q),
                                 at->e2_q26 >> (26 - LONG_Q)};
   int32_t pitch_q12 = pad->pitch_q26 >> (26 - PLACE_Q);
   for (int i = 0; i < COLUMNS; i++) {
-    set_offset((i - COLUMNS / 2) * pitch_q12 - origin.x_q12, origin.pull_x_q13, origin.e1_q17, origin.e1_q17,
-               origin.e2_q17, &off_x[i]);
+    set_offset((i - COLUMNS / 2) * pitch_q12 - origin.x_q12, origin.pull_x_q13, origin.e1_q17, origin.e1_q17, origin.e2_q17, &off_x[i]);
   }
   for (int k = 0; k < ROWS; k++) {
-    set_offset((k - ROWS / 2) * pitch_q12 - origin.y_q12, origin.pull_y_q13, origin.e1_q17, origin.e2_q17,
-               -origin.e1_q17, &off_y[k]);
+    set_offset((k - ROWS / 2) * pitch_q12 - origin.y_q12, origin.pull_y_q13, origin.e1_q17, origin.e2_q17, -origin.e1_q17, &off_y[k]);
   }
   int32_t wider_q26 = fixed_mul_16(at->t_q26, KAPPA_Q14) * 4;
   for (int j = 0; j < FIT_TANGENTIAL_TERMS; j++) {

@@ -5,11 +5,9 @@
  *   m = sum over the normal terms of     (A + E / v^2) share V0 / v exp(-d' d / (2 v))
  *     + sum over the tangential terms of (Bx dx + By dy) moment V0 / V^2 exp(-d' d / (2 V))
  *   E = e1 (dx^2 - dy^2) / 2 + e2 dx dy
- * with v and V the terms' variances and t, or KAPPA t, of the contact's own, and V0 the widest
- * normal term's, so that the forces are 2 pi V0 A and 2 pi V0 B. E is what a contact's longer and
- * shorter axis make of its pressure, to first order.
- * The order of the unknowns: those that the others determine least come last. The tangential force
- * follows from the remainder of their columns. */
+ * with v and V the terms' variances and t, or KAPPA t, of the contact's own, and V0 the widest normal term's, so that the forces are 2 pi
+ * V0 A and 2 pi V0 B. E is what a contact's longer and shorter axis make of its pressure, to first order. The order of the unknowns: those
+ * that the others determine least come last. The tangential force follows from the remainder of their columns. */
 #pragma once
 
 #include "fit/fit_grid_parts.h"
@@ -64,18 +62,12 @@ struct outcome {
 };
 
 /* The least t. */
-FIXED_INLINE int32_t spread_least(const struct fit_pad *pad) {
-  return -fixed_mul_16(pad->variance_q26[0], SPREAD_LEAST_Q15) * 2;
-}
+FIXED_INLINE int32_t spread_least(const struct fit_pad *pad) { return -fixed_mul_16(pad->variance_q26[0], SPREAD_LEAST_Q15) * 2; }
 
-/* Three quarters of a pitch beyond the outer nodes, for an even number of them beyond those on the
- * origin's far side too. */
-FIXED_INLINE int32_t reach(const struct fit_pad *pad, int32_t nodes) {
-  return (4 * (nodes / 2) + 3) * (pad->pitch_q26 >> 2);
-}
+/* Three quarters of a pitch beyond the outer nodes, for an even number of them beyond those on the origin's far side too. */
+FIXED_INLINE int32_t reach(const struct fit_pad *pad, int32_t nodes) { return (4 * (nodes / 2) + 3) * (pad->pitch_q26 >> 2); }
 
-/* a * b / 2^shift, 16 < shift <= 32, from three 16-bit products, for |a|, |b| <= 2^30: error below
- * 1 + 2^(32 - shift) units. */
+/* a * b / 2^shift, 16 < shift <= 32, from three 16-bit products, for |a|, |b| <= 2^30: error below 1 + 2^(32 - shift) units. */
 FIXED_INLINE int32_t product(int32_t a, int32_t b, int shift) {
   int32_t a_high = a >> 16, a_low = (uint16_t)a;
   int32_t b_high = b >> 16, b_low = (uint16_t)b;
@@ -96,12 +88,10 @@ FIXED_INLINE int32_t scaled_by(int32_t a, int32_t b, int shift) {
 /* value / 2^shift to the nearest. */
 FIXED_INLINE int32_t rounded(int32_t value, int shift) { return (value + (1 << (shift - 1))) >> shift; }
 
-/* fit_tangential_model.c: residuals and columns of the model there, with the weights. column_q: Qs
- * in which it leaves the columns. */
+/* fit_tangential_model.c: residuals and columns of the model there, with the weights. column_q: Qs in which it leaves the columns. */
 extern const uint8_t fit_tangential_column_q[UNKNOWNS];
-void fit_tangential_linearise(const struct problem *problem, const struct fit_tangential_unknowns *at,
-                              struct fit_tangential_room *room);
+void fit_tangential_linearise(const struct problem *problem, const struct fit_tangential_unknowns *at, struct fit_tangential_room *room);
 
 /* fit_tangential_step.c: one Gauss-Newton step from there. */
-void fit_tangential_improve(const struct problem *problem, struct fit_tangential_unknowns *at,
-                            struct fit_tangential_room *room, struct outcome *outcome);
+void fit_tangential_improve(const struct problem *problem, struct fit_tangential_unknowns *at, struct fit_tangential_room *room,
+                            struct outcome *outcome);

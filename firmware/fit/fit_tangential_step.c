@@ -58,8 +58,8 @@ NOINLINE static uint32_t column_size(const int32_t *column, uint32_t largest) {
   const int32_t *end = column + NODES * UNKNOWNS;
   const int together = TOGETHER;
   do {
-    largest |= fixed_size(column[0]) | (together > 1 ? fixed_size(column[UNKNOWNS]) : 0) |
-               (together > 2 ? fixed_size(column[2 * UNKNOWNS]) : 0);
+    largest |=
+        fixed_size(column[0]) | (together > 1 ? fixed_size(column[UNKNOWNS]) : 0) | (together > 2 ? fixed_size(column[2 * UNKNOWNS]) : 0);
     column += together * UNKNOWNS;
   } while (column != end);
   return largest;
@@ -85,8 +85,8 @@ NOINLINE static int32_t shift_column(int32_t *column, const int32_t *residual, i
 }
 
 /* Brings a column to its bits at most, and its prior with it. */
-NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, int32_t prior_q26,
-                                      int32_t prior_residual, struct equations *equations) {
+NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, int32_t prior_q26, int32_t prior_residual,
+                                      struct equations *equations) {
   int32_t *column = &room->node[0].column[u];
   int32_t q = fit_tangential_column_q[u];
   uint32_t largest = column_size(column, fixed_size(prior_q26) >> (26 - q));
@@ -106,10 +106,9 @@ NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, i
 
 /* Every pair of the first seven unknowns is a, a + 1, a + 2 or a + 3 modulo 7 of one a. */
 _Static_assert(UNKNOWNS == 8, "every pair is in one of these");
-#define SUM_PRODUCTS(a)                                                                                                \
-  NOINLINE static void sum_products_##a(const int32_t *column, int32_t *sums) {                                        \
-    fixed_sum_products(column, column + NODES * UNKNOWNS, sums, UNKNOWNS, (a), ((a) + 1) % 7, ((a) + 2) % 7,           \
-                       ((a) + 3) % 7);                                                                                 \
+#define SUM_PRODUCTS(a)                                                                                                                    \
+  NOINLINE static void sum_products_##a(const int32_t *column, int32_t *sums) {                                                            \
+    fixed_sum_products(column, column + NODES * UNKNOWNS, sums, UNKNOWNS, (a), ((a) + 1) % 7, ((a) + 2) % 7, ((a) + 3) % 7);               \
   }
 SUM_PRODUCTS(0)
 SUM_PRODUCTS(1)
@@ -120,8 +119,8 @@ SUM_PRODUCTS(5)
 SUM_PRODUCTS(6)
 
 static void form(struct fit_tangential_room *room, const int32_t *scale) {
-  static void (*const sum[UNKNOWNS - 1])(const int32_t *, int32_t *) = {
-      sum_products_0, sum_products_1, sum_products_2, sum_products_3, sum_products_4, sum_products_5, sum_products_6};
+  static void (*const sum[UNKNOWNS - 1])(const int32_t *, int32_t *) = {sum_products_0, sum_products_1, sum_products_2, sum_products_3,
+                                                                        sum_products_4, sum_products_5, sum_products_6};
   for (int a = 0; a < UNKNOWNS - 1; a++) {
     int32_t sums[4];
     sum[a](room->node[0].column, sums);
@@ -256,8 +255,8 @@ NOINLINE static int32_t take_step(const struct problem *problem, const struct ou
   return most;
 }
 
-void fit_tangential_improve(const struct problem *problem, struct fit_tangential_unknowns *at,
-                            struct fit_tangential_room *room, struct outcome *outcome) {
+void fit_tangential_improve(const struct problem *problem, struct fit_tangential_unknowns *at, struct fit_tangential_room *room,
+                            struct outcome *outcome) {
   struct priors priors;
   struct equations equations;
   fit_tangential_linearise(problem, at, room);

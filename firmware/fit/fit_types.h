@@ -6,8 +6,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Widths that the fit can estimate, in pitches: narrower ones fall between the sensors, wider ones
- * have no location on the array. */
+/* Widths that the fit can estimate, in pitches: narrower ones fall between the sensors, wider ones have no location on the array. */
 #define FIT_SIGMA_MIN 0.158f
 #define FIT_SIGMA_MAX 5.0f
 
@@ -15,8 +14,7 @@
 #define FIT_GRID_MAX_NODES 6
 
 /* The fixed-point kernels take the rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS sensors that they are compiled for;
- * with FIT_GRID_ANY instead, as for the host, each call takes that of its array, and gives the same bits more slowly.
- */
+ * with FIT_GRID_ANY instead, as for the host, each call takes that of its array, and gives the same bits more slowly. */
 #ifdef FIT_GRID_ANY
 #define FIT_GRID_MOST_NODES FT_MAX_SENSORS
 #else
@@ -46,8 +44,7 @@ struct fit_array {
   struct fit_grid_shape grid;
 };
 
-/* Of a sensor, beside its gain: how far it is from its place in the array, and how much wider than
- * the others it responds to a contact. */
+/* Of a sensor, beside its gain: how far it is from its place in the array, and how much wider than the others it responds to a contact. */
 struct fit_own {
   int32_t off_x_q15, off_y_q15; /* pitches; within +-1, as the next */
   int32_t wider_q15;            /* log of its width over theirs */
@@ -63,9 +60,8 @@ struct fit_settings {
   /* A reading cut_noises noise_Pa below zero counts as zero, since a Gaussian is never negative. 0: no
    * reading is changed, as a tangential force asks for. */
   uint8_t cut_noises;
-  /* What the rubber takes from the readings around a contact, where that is known:
-   * dip_share p0 exp(-r^2 / (2 dip_sd^2)). Readings are not cut then. None unless the share is above 0 and at most
-   * FIT_DIP_SHARE_MAX, and the sd is 0.001..10000 mm. */
+  /* What the rubber takes from the readings around a contact, where that is known: dip_share p0 exp(-r^2 / (2 dip_sd^2)). Readings are not
+   * cut then. None unless the share is above 0 and at most FIT_DIP_SHARE_MAX, and the sd is 0.001..10000 mm. */
   float dip_share, dip_sd_mm;
   /* [sensor] or NULL: not known. Before the last two of three and more iterations, each reading is
    * corrected by it to first order, by at most half of what the model has there. */

@@ -2,10 +2,10 @@
 
 #include <stddef.h>
 
-#define ROW(ratio, bits, max_us, noise_Pa, noise_degC)                                                                 \
-  {                                                                                                                    \
-    .osr = (ratio), .convert_pressure = 0x40 | (bits), .convert_temperature = 0x50 | (bits),                           \
-    .conversion_us = (max_us)*105u / 100u, .maximum_us = (max_us), .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)       \
+#define ROW(ratio, bits, max_us, noise_Pa, noise_degC)                                                                                     \
+  {                                                                                                                                        \
+    .osr = (ratio), .convert_pressure = 0x40 | (bits), .convert_temperature = 0x50 | (bits), .conversion_us = (max_us)*105u / 100u,        \
+    .maximum_us = (max_us), .noise_Pa_q10 = (int32_t)((noise_Pa)*1024.0f)                                                                  \
   }
 static const struct ms58xx_osr osr_table[] = {MS58XX_OSR_TABLE(ROW)};
 
@@ -52,18 +52,13 @@ enum ms58xx_branch ms58xx_branch_of(enum ms58xx_branch previous, int32_t tempera
   int32_t warm_edge_cC = 2000;
   int32_t very_cold_edge_cC = MS58XX_VERY_COLD_cC;
   switch (previous) {
-  case MS58XX_BRANCH_WARM:
-    warm_edge_cC -= MS58XX_BRANCH_HYSTERESIS_cC;
-    break;
+  case MS58XX_BRANCH_WARM: warm_edge_cC -= MS58XX_BRANCH_HYSTERESIS_cC; break;
   case MS58XX_BRANCH_COLD:
     warm_edge_cC += MS58XX_BRANCH_HYSTERESIS_cC;
     very_cold_edge_cC -= MS58XX_BRANCH_HYSTERESIS_cC;
     break;
-  case MS58XX_BRANCH_VERY_COLD:
-    very_cold_edge_cC += MS58XX_BRANCH_HYSTERESIS_cC;
-    break;
-  case MS58XX_BRANCH_UNKNOWN:
-    break;
+  case MS58XX_BRANCH_VERY_COLD: very_cold_edge_cC += MS58XX_BRANCH_HYSTERESIS_cC; break;
+  case MS58XX_BRANCH_UNKNOWN: break;
   }
   if (temperature_cC >= warm_edge_cC) {
     return MS58XX_BRANCH_WARM;
@@ -73,9 +68,7 @@ enum ms58xx_branch ms58xx_branch_of(enum ms58xx_branch previous, int32_t tempera
 
 static int32_t first_order_cC(int32_t dT, uint16_t c6) { return 2000 + (int32_t)(((int64_t)dT * c6) >> 23); }
 
-static int32_t difference_from(const struct ms58xx_prom *prom, uint32_t d2) {
-  return (int32_t)d2 - ((int32_t)prom->word[5] << 8);
-}
+static int32_t difference_from(const struct ms58xx_prom *prom, uint32_t d2) { return (int32_t)d2 - ((int32_t)prom->word[5] << 8); }
 
 int32_t ms58xx_first_order_cC(const struct ms58xx_prom *prom, uint32_t d2) {
   return first_order_cC(difference_from(prom, d2), prom->word[6]);
@@ -107,24 +100,17 @@ void ms58xx_compensate_temperature(const struct ms58xx_prom *prom, uint32_t d2, 
   int64_t below = temperature_cC - 2000;
   int64_t below_squared = below * below;
   switch (thermal->branch) {
-  case MS58XX_BRANCH_COLD:
-    MS58XX_COLD(TERM)
-    break;
-  case MS58XX_BRANCH_VERY_COLD:
-    MS58XX_VERY_COLD(TERM)
-    break;
+  case MS58XX_BRANCH_COLD: MS58XX_COLD(TERM) break;
+  case MS58XX_BRANCH_VERY_COLD: MS58XX_VERY_COLD(TERM) break;
   case MS58XX_BRANCH_WARM:
-  case MS58XX_BRANCH_UNKNOWN: /* which no temperature is */
-    MS58XX_WARM(TERM)
-    break;
+  case MS58XX_BRANCH_UNKNOWN: /* which no temperature is */ MS58XX_WARM(TERM) break;
   }
   thermal->temperature_cC = temperature_cC;
   thermal->offset = offset;
   thermal->sensitivity = sensitivity;
 }
 
-/* The product of a 24-bit code. Sensitivities of 35 bits, all that make sense, take four 32-bit
- * products and half the time. */
+/* The product of a 24-bit code. Sensitivities of 35 bits, all that make sense, take four 32-bit products and half the time. */
 static int64_t multiply(uint32_t code, int64_t sensitivity) {
   int32_t top = (int32_t)(sensitivity >> 32);
   if (top < -4 || top > 3) {

@@ -52,9 +52,8 @@ enum ms58xx_prom_state {
 };
 enum ms58xx_prom_state ms58xx_check_prom(const struct ms58xx_prom *prom);
 
-/* The second-order corrections come in three branches of the first-order temperature. Where those
- * of the MS5840 meet at 10 degC the pressure steps by some 60 Pa at 1 bar, so a branch is left only
- * when the temperature is MS58XX_BRANCH_HYSTERESIS_cC beyond its edge. */
+/* The second-order corrections come in three branches of the first-order temperature. Where those of the MS5840 meet at 10 degC the
+ * pressure steps by some 60 Pa at 1 bar, so a branch is left only when the temperature is MS58XX_BRANCH_HYSTERESIS_cC beyond its edge. */
 enum ms58xx_branch {
   MS58XX_BRANCH_UNKNOWN = 0,
   MS58XX_BRANCH_WARM,      /* >= 20 degC */

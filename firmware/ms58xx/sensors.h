@@ -19,18 +19,16 @@
  *                     pressure in Pa rms and of a temperature in degC rms
  *
  * To add a sensor, add a section here, its name in cmake/options.cmake, and its data in boards/native/sim_ms5840.c and
- * in the emulator's board/ms5840.mjs. If its CRC is elsewhere (MS5611: in an eighth word), change ms58xx_prom_crc4 too.
- */
+ * in the emulator's board/ms5840.mjs. If its CRC is elsewhere (MS5611: in an eighth word), change ms58xx_prom_crc4 too. */
 #pragma once
 
 #define MS58XX_MS5840 1
 #define MS58XX_MS5837_30BA 2
 
 #if MS58XX_SENSOR == MS58XX_MS5840
-/* MS5840-02BA data sheet: conversion times, noise, compensation. The first order was checked with the worked example of
- * the MS5837-02BA data sheet, page 7. The extended range ends at 2 bar. Beyond it a reading is biased low. Readings
- * count as beyond it from 1 % before, so that a part whose readings end right there does not pass by its noise. 8 kPa:
- * a code with bit 18 wrong is 11 kPa off. */
+/* MS5840-02BA data sheet: conversion times, noise, compensation. The first order was checked with the worked example of the MS5837-02BA
+ * data sheet, page 7. The extended range ends at 2 bar. Beyond it a reading is biased low. Readings count as beyond it from 1 % before, so
+ * that a part whose readings end right there does not pass by its noise. 8 kPa: a code with bit 18 wrong is 11 kPa off. */
 #define MS58XX_MAX_PRESSURE_Pa 198000
 #define MS58XX_APART_Pa 1000 /* recalled: a part is off by up to 4 mbar */
 #define MS58XX_STEP_Pa 8192
@@ -45,16 +43,15 @@
 #define MS58XX_COLD(TERM) TERM(T, 12, DT, 35) TERM(OFF, 30, X, 8)
 #define MS58XX_VERY_COLD(TERM) TERM(T, 14, DT, 35) TERM(OFF, 35, X, 3) TERM(SENS, 63, X, 5)
 #define MS58XX_NOISE_MAX_Pa 11
-#define MS58XX_OSR_TABLE(ROW)                                                                                          \
-  ROW(256, 0x0, 560, 11.0f, 0.012f), ROW(512, 0x2, 1100, 6.2f, 0.009f), ROW(1024, 0x4, 2170, 3.9f, 0.006f),            \
+#define MS58XX_OSR_TABLE(ROW)                                                                                                              \
+  ROW(256, 0x0, 560, 11.0f, 0.012f), ROW(512, 0x2, 1100, 6.2f, 0.009f), ROW(1024, 0x4, 2170, 3.9f, 0.006f),                                \
       ROW(2048, 0x6, 4320, 2.8f, 0.004f), ROW(4096, 0x8, 8610, 2.1f, 0.003f), ROW(8192, 0xA, 17200, 1.6f, 0.002f)
 
 #elif MS58XX_SENSOR == MS58XX_MS5837_30BA
-/* MS5837-30BA data sheet of 10/2015, pages 7 and 9, and rev. C2 of 12/2019, pages 9 and 11: PROM,
- * commands, first order. Rev. C2 no longer lists OSR 8192. Second order: as public drivers have it
- * (BlueRobotics, libdriver). Conversion times: those of the MS5611, which has the same converter;
- * that of OSR 8192 is twice the one before. Noise: 20 Pa at OSR 8192 by the data sheet, the others
- * are recalled. The sensor ends at 30 bar; a pressure in 1/1024 Pa ends at 20.97 bar in 32 bits. */
+/* MS5837-30BA data sheet of 10/2015, pages 7 and 9, and rev. C2 of 12/2019, pages 9 and 11: PROM, commands, first order. Rev. C2 no longer
+ * lists OSR 8192. Second order: as public drivers have it (BlueRobotics, libdriver). Conversion times: those of the MS5611, which has the
+ * same converter; that of OSR 8192 is twice the one before. Noise: 20 Pa at OSR 8192 by the data sheet, the others are recalled. The sensor
+ * ends at 30 bar; a pressure in 1/1024 Pa ends at 20.97 bar in 32 bits. */
 #define MS58XX_MAX_PRESSURE_Pa 2000000
 #define MS58XX_APART_Pa 20000 /* recalled: up to 50 mbar below 6 bar */
 #define MS58XX_STEP_Pa 32768
@@ -70,8 +67,8 @@
 #define MS58XX_COLD(TERM) TERM(OFF, 3, X, 1) TERM(SENS, 5, X, 3) TERM(T, 3, DT, 33)
 #define MS58XX_VERY_COLD(TERM) TERM(OFF, 7, Y, 0) TERM(SENS, 4, Y, 0) MS58XX_COLD(TERM)
 #define MS58XX_NOISE_MAX_Pa 157
-#define MS58XX_OSR_TABLE(ROW)                                                                                          \
-  ROW(256, 0x0, 600, 157.0f, 0.012f), ROW(512, 0x2, 1170, 84.0f, 0.009f), ROW(1024, 0x4, 2280, 54.0f, 0.006f),         \
+#define MS58XX_OSR_TABLE(ROW)                                                                                                              \
+  ROW(256, 0x0, 600, 157.0f, 0.012f), ROW(512, 0x2, 1170, 84.0f, 0.009f), ROW(1024, 0x4, 2280, 54.0f, 0.006f),                             \
       ROW(2048, 0x6, 4540, 38.0f, 0.004f), ROW(4096, 0x8, 9040, 28.0f, 0.003f), ROW(8192, 0xA, 18080, 20.0f, 0.002f)
 
 #else

@@ -22,9 +22,8 @@ void port_alarm_at_us(uint64_t t_us);
  * checked just before it cannot be missed. Main context only. */
 void port_sleep(void);
 
-/* Saving: the processor is slow, and what costs current is off unless USB needs it to wake up; time
- * and alarms go on. The array bus must rest, and is not to be used until the saving has ended,
- * which takes 0.1 ms. Main context only; no effect if it is so already. */
+/* Saving: the processor is slow, and what costs current is off unless USB needs it to wake up; time and alarms go on. The array bus must
+ * rest, and is not to be used until the saving has ended, which takes 0.1 ms. Main context only; no effect if it is so already. */
 void port_save_power(bool saving);
 
 /* Must be called at least once each PORT_WATCHDOG_PERIOD_us from the main loop, else the chip is reset. It counts only
@@ -38,14 +37,12 @@ enum port_part { PORT_PART_SCAN, PORT_PART_USB, PORT_PARTS };
 #define PORT_PART_LIMIT_us 400000u
 void port_alive(enum port_part part);
 
-/* For the record of a crash: what the main loop is at, and what happened (common/crash.h for the
- * details). Main context only. */
+/* For the record of a crash: what the main loop is at, and what happened (common/crash.h for the details). Main context only. */
 void port_at(enum crash_activity activity);
 void port_event(enum crash_event event, uint8_t detail);
 
-/* A second processor that shares the memory: from now on it calls serve(context) whenever it is
- * woken, until that returns false. Whatever it did before has ended. False: there is none, or it
- * does not start. Takes some 20 us. Main context only. */
+/* A second processor that shares the memory: from now on it calls serve(context) whenever it is woken, until that returns false. Whatever
+ * it did before has ended. False: there is none, or it does not start. Takes some 20 us. Main context only. */
 bool port_worker_start(bool (*serve)(void *context), void *context);
 
 /* Wakes it; port_sleep() returns once it has served. */

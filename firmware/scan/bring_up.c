@@ -57,12 +57,8 @@ static void judge_pass(struct bring_up *bring_up) {
       bring_up->good |= bit;
       use_prom(bring_up, k);
       break;
-    case MS58XX_PROM_CRC_DIFFERS:
-      bring_up->differs |= bit;
-      break;
-    case MS58XX_PROM_BLANK:
-      bring_up->blank |= bit;
-      break;
+    case MS58XX_PROM_CRC_DIFFERS: bring_up->differs |= bit; break;
+    case MS58XX_PROM_BLANK: bring_up->blank |= bit; break;
     }
   }
 }
@@ -94,8 +90,7 @@ struct bring_up_result bring_up_end(struct bring_up *bring_up, uint64_t now_us) 
     }
   }
   const uint32_t admitted = bring_up->good | bring_up->differs;
-  bring_up->rechecks =
-      bring_up->differs == 0 ? 0 : (uint8_t)(bring_up->rechecks + (bring_up->rechecks <= BRING_UP_RECHECKS));
+  bring_up->rechecks = bring_up->differs == 0 ? 0 : (uint8_t)(bring_up->rechecks + (bring_up->rechecks <= BRING_UP_RECHECKS));
   if (admitted == all_sensors(bring_up) && !bring_up->of_suspects && !bring_up_wants_recheck(bring_up)) {
     bring_up->next_us = now_us + REST * (now_us - bring_up->began_us);
     bring_up->interval_us = INTERVAL_MIN_us;

@@ -1,13 +1,11 @@
-/* Admits sensors: all are reset, and their calibration PROMs are read and judged. Event context; scan.c moves the
- * bytes.
+/* Admits sensors: all are reset, and their calibration PROMs are read and judged. Event context; scan.c moves the bytes.
  *
  * A sensor is admitted when it has acknowledged the reset and its whole PROM. PROMs are read up to three times, until
  * all of them are good. One whose CRC still differs is used and reported. A blank one is not used.
  *
- * That costs 5 ms of frames with a data line for each sensor, and some 25 ms behind multiplexers. So it takes at most 5
- * % of the time. While it leaves a sensor out, or is for a suspect, the next one comes after 1, 2, 4 and then 8 s. A
- * sensor that does not answer at all costs no admission. One whose CRC differs costs BRING_UP_RECHECKS, since the bus
- * may have been disturbed. */
+ * That costs 5 ms of frames with a data line for each sensor, and some 25 ms behind multiplexers. So it takes at most 5 % of the time.
+ * While it leaves a sensor out, or is for a suspect, the next one comes after 1, 2, 4 and then 8 s. A sensor that does not answer at all
+ * costs no admission. One whose CRC differs costs BRING_UP_RECHECKS, since the bus may have been disturbed. */
 #pragma once
 
 #include "array_bus/array_bus.h"

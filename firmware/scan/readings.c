@@ -27,8 +27,7 @@ static int32_t difference(int32_t a, int32_t b) { return (int32_t)((uint32_t)a -
 
 /* The sensor whose reading has stepped while all others of these did not move; all that have fallen, or risen faster
  * than presses do. Bitmaps. */
-static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const int32_t last_Pa_q10[], bool is_fast,
-                           uint32_t *jolted) {
+static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const int32_t last_Pa_q10[], bool is_fast, uint32_t *jolted) {
   uint32_t stepped = 0;
   uint32_t largest = 0;
   uint32_t second = 0;
@@ -53,8 +52,7 @@ static uint32_t find_alone(const struct frame *frame, uint32_t sensors, const in
 }
 
 /* alone: the sensor whose reading has just stepped alone, or 0. */
-static void judge_alone(struct readings *readings, uint32_t alone, const struct frame *frame,
-                        const int32_t last_Pa_q10[]) {
+static void judge_alone(struct readings *readings, uint32_t alone, const struct frame *frame, const int32_t last_Pa_q10[]) {
   if (alone) {
     const uint8_t k = index_of(alone);
     const int32_t to_Pa_q10 = frame->pressure_Pa_q10[k];
@@ -69,8 +67,7 @@ static void judge_alone(struct readings *readings, uint32_t alone, const struct 
 }
 
 /* Of a sensor without a reading that counts the last one is kept, to hold the next against. */
-static void keep(struct readings *readings, uint32_t usable, uint32_t left_out, const int32_t last_Pa_q10[],
-                 int32_t kept_Pa_q10[]) {
+static void keep(struct readings *readings, uint32_t usable, uint32_t left_out, const int32_t last_Pa_q10[], int32_t kept_Pa_q10[]) {
   uint32_t bit = 1;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++, bit <<= 1) {
     if (!(usable & ~left_out & bit)) {
@@ -82,9 +79,8 @@ static void keep(struct readings *readings, uint32_t usable, uint32_t left_out, 
 }
 
 /* For frames that are not like most. Returns the bitmap of readings that do not count. */
-static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *readings, struct frame *frame,
-                                                            uint32_t usable, const int32_t last_Pa_q10[],
-                                                            int32_t kept_Pa_q10[]) {
+static __attribute__((noinline, cold)) uint32_t look_closer(struct readings *readings, struct frame *frame, uint32_t usable,
+                                                            const int32_t last_Pa_q10[], int32_t kept_Pa_q10[]) {
   const bool all = usable == all_sensors(frame->sensor_count);
   const uint32_t seen = usable & (readings->has_last | readings->awaited);
   uint32_t jolted = 0;
@@ -122,8 +118,8 @@ struct glance {
 };
 
 /* Keeps the readings on the way. */
-static struct glance compensate(const struct readings *readings, const uint32_t code[], uint32_t usable,
-                                struct frame *frame, int32_t kept_Pa_q10[]) {
+static struct glance compensate(const struct readings *readings, const uint32_t code[], uint32_t usable, struct frame *frame,
+                                int32_t kept_Pa_q10[]) {
   struct glance glance = {0, 0};
   const struct ms58xx_thermal *thermal = readings->thermal;
   int32_t *pressure_Pa_q10 = frame->pressure_Pa_q10;

@@ -12,18 +12,16 @@
  * that was all. If it stays, still alone, the sensor is a suspect. Steps beside which others move count at once. So
  * does every step while a sensor is missing, since that one may have measured it.
  *
- * A sensor whose supply dips may lose its state, and go on with codes that are off. Then it reads 0 once where its
- * conversion was lost, or its pressure falls, and its temperature steps. So one that reads 0 is left out until its next
- * temperature, which is asked for at once. One whose pressure falls by READINGS_JOLT_Pa_q10 at once with others' is
- * doubtful until then, but used, for a release does the same where frames are 5 ms or more apart in the twin: at 57
- * frames/s each quick release of more than 6 kPa. So is one that rises by as much within READINGS_FAST_us. Only frames
- * whose sum moves by as much are searched for it: moves that compensate each other hide a fall. If the temperature has
- * stepped from the sensor's own last it has lost its state, whatever the others do.
+ * A sensor whose supply dips may lose its state, and go on with codes that are off. Then it reads 0 once where its conversion was lost, or
+ * its pressure falls, and its temperature steps. So one that reads 0 is left out until its next temperature, which is asked for at once.
+ * One whose pressure falls by READINGS_JOLT_Pa_q10 at once with others' is doubtful until then, but used, for a release does the same where
+ * frames are 5 ms or more apart in the twin: at 57 frames/s each quick release of more than 6 kPa. So is one that rises by as much within
+ * READINGS_FAST_us. Only frames whose sum moves by as much are searched for it: moves that compensate each other hide a fall. If the
+ * temperature has stepped from the sensor's own last it has lost its state, whatever the others do.
  *
- * A suspect is left out until it has been reset and its PROM read again. Then its temperature and its pressure count as
- * its first. Its zero still holds, since it is the same sensor, unless it was measured shortly before (condition.h).
- * The same holds for a sensor whose pressure has stepped alone, for example when it was reset for another's sake, or
- * when it returns.
+ * A suspect is left out until it has been reset and its PROM read again. Then its temperature and its pressure count as its first. Its zero
+ * still holds, since it is the same sensor, unless it was measured shortly before (condition.h). The same holds for a sensor whose pressure
+ * has stepped alone, for example when it was reset for another's sake, or when it returns.
  *
  * A sensor whose temperature is apart from the others' (common/apart.h) since it came is doubtful until it has read
  * like them twice in a row: its PROM may be wrong in spite of its CRC.
@@ -111,14 +109,12 @@ enum readings_news {
 };
 
 /* Returns a bitmap of readings_news. Cost: some 800 Cortex-M0+ cycles a sensor. */
-uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count,
-                                   const struct readings_temperature *taken);
+uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count, const struct readings_temperature *taken);
 
 /* These are apart from the others at rest (condition/plausibility.h), and are doubtful until a call states
  * otherwise. That takes effect with the next temperature; a new doubt does so at once. */
 void readings_doubt(struct readings *readings, uint32_t apart);
 
 /* Fills in pressures, valid, doubtful, unsettled, saturated, renewed and restored. code: [sensor];
- * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost:
- * some 140 Cortex-M0+ cycles a sensor. */
+ * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost: some 140 Cortex-M0+ cycles a sensor. */
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good, struct frame *frame);

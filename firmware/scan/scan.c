@@ -46,9 +46,7 @@ static void hand_over(_Atomic uint32_t *state, enum scan_slot_state to) {
   set(state, to);
 }
 
-static const struct ms58xx_osr *get_osr(const struct scan *scan) {
-  return atomic_load_explicit(&scan->osr, memory_order_relaxed);
-}
+static const struct ms58xx_osr *get_osr(const struct scan *scan) { return atomic_load_explicit(&scan->osr, memory_order_relaxed); }
 
 static uint32_t all_sensors(const struct scan *scan) {
   /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */
@@ -92,9 +90,7 @@ enum ft_status scan_set_osr(struct scan *scan, uint16_t osr) {
   return FT_OK;
 }
 
-void scan_set_rate_mHz(struct scan *scan, uint32_t rate_mHz) {
-  set(&scan->period_us, rate_mHz == 0 ? 0 : 1000000000u / rate_mHz);
-}
+void scan_set_rate_mHz(struct scan *scan, uint32_t rate_mHz) { set(&scan->period_us, rate_mHz == 0 ? 0 : 1000000000u / rate_mHz); }
 
 void scan_ask_temperature(struct scan *scan) { set(&scan->temperature_within_us, TEMPERATURE_RETRY_us); }
 
@@ -317,10 +313,8 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
   const struct array_bus *bus = scan->bus;
   struct scan_conversion *conversion = scan->conversion;
   switch (scan->state) {
-  case SCAN_RESET:
-    return bus->start_command(bus->context, MS58XX_CMD_RESET, now_us);
-  case SCAN_READ_PROM:
-    return bus->start_read(bus->context, (uint8_t)(MS58XX_CMD_READ_PROM + 2 * scan->bring_up.word), 2, now_us);
+  case SCAN_RESET: return bus->start_command(bus->context, MS58XX_CMD_RESET, now_us);
+  case SCAN_READ_PROM: return bus->start_read(bus->context, (uint8_t)(MS58XX_CMD_READ_PROM + 2 * scan->bring_up.word), 2, now_us);
   case SCAN_CONVERT:
     conversion->osr = get_osr(scan);
     conversion->t_begin_us = now_us;
@@ -328,13 +322,9 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
       scan->next_temperature_us = now_us + get(&scan->temperature_interval_us);
     }
     return bus->start_command(
-        bus->context,
-        conversion->is_temperature ? conversion->osr->convert_temperature : conversion->osr->convert_pressure, now_us);
-  case SCAN_READ_ADC:
-    conversion->t_converted_us = now_us;
-    return bus->start_read(bus->context, MS58XX_CMD_READ_ADC, 3, now_us);
-  default:
-    return bus->start_recovery(bus->context, now_us);
+        bus->context, conversion->is_temperature ? conversion->osr->convert_temperature : conversion->osr->convert_pressure, now_us);
+  case SCAN_READ_ADC: conversion->t_converted_us = now_us; return bus->start_read(bus->context, MS58XX_CMD_READ_ADC, 3, now_us);
+  default: return bus->start_recovery(bus->context, now_us);
   }
 }
 
@@ -355,8 +345,7 @@ static void fail_operation(struct scan *scan, enum ft_status why, uint64_t now_u
 }
 
 static bool state_has_operation(enum scan_state state) {
-  return state == SCAN_RESET || state == SCAN_READ_PROM || state == SCAN_CONVERT || state == SCAN_READ_ADC ||
-         state == SCAN_RECOVER;
+  return state == SCAN_RESET || state == SCAN_READ_PROM || state == SCAN_CONVERT || state == SCAN_READ_ADC || state == SCAN_RECOVER;
 }
 
 /* Starts what the state asks for, if it asks for anything. */
@@ -374,8 +363,7 @@ static void begin_operation(struct scan *scan, uint64_t now_us) {
   }
 }
 
-/* The codes are in scan->result, and stay there while the next operation runs: nothing is done
- * before that but what it needs. */
+/* The codes are in scan->result, and stay there while the next operation runs: nothing is done before that but what it needs. */
 static void end_reading(struct scan *scan, uint64_t now_us) {
   struct scan_conversion *read = scan->conversion;
   scan->last_was_temperature = read->is_temperature;
@@ -418,9 +406,7 @@ static void end_operation(struct scan *scan, uint64_t now_us) {
     scan->conversion->t_us = now_us + scan->conversion->osr->conversion_us / 2u;
     wait_in(scan, SCAN_WAIT_CONVERSION, now_us + read_after_us(scan));
     break;
-  case SCAN_READ_ADC:
-    end_reading(scan, now_us);
-    break;
+  case SCAN_READ_ADC: end_reading(scan, now_us); break;
   default: /* SCAN_RECOVER: a conversion may still be running, and a command would spoil it */
     scan->bus_stuck = false;
     scan->recovery_delay_us = RECOVERY_DELAY_MIN_us;
@@ -436,12 +422,8 @@ static void end_wait(struct scan *scan, uint64_t now_us) {
       begin_bring_up(scan, now_us);
     }
     break;
-  case SCAN_WAIT_RESET:
-    enter(scan, SCAN_READ_PROM);
-    break;
-  case SCAN_WAIT_CONVERSION:
-    enter(scan, SCAN_READ_ADC);
-    break;
+  case SCAN_WAIT_RESET: enter(scan, SCAN_READ_PROM); break;
+  case SCAN_WAIT_CONVERSION: enter(scan, SCAN_READ_ADC); break;
   case SCAN_WAIT_RECOVERY:
     if (rest(scan, now_us)) {
       break;
@@ -454,9 +436,7 @@ static void end_wait(struct scan *scan, uint64_t now_us) {
       begin_bring_up(scan, now_us);
     }
     break;
-  default:
-    leave_idle(scan, now_us);
-    break;
+  default: leave_idle(scan, now_us); break;
   }
 }
 
@@ -532,8 +512,7 @@ static void fill_head(struct scan *scan, const struct scan_conversion *conversio
   frame->temperature_cC = scan->readings.temperature_cC;
 }
 
-/* What scan_step is to know. Before a slot is given back: no admission begins while a temperature
- * waits, and none is asked for twice. */
+/* What scan_step is to know. Before a slot is given back: no admission begins while a temperature waits, and none is asked for twice. */
 static void report(struct scan *scan) {
   set(&scan->suspects, scan->readings.suspects);
   set(&scan->counters.implausible_readings, scan->readings.left_out);

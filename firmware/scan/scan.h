@@ -50,9 +50,7 @@ struct scan_settings {
 #define SCAN_TEMPERATURE_INTERVAL_MAX_ms 2000u
 
 /* A counter or bitmap that the event context writes. */
-static inline uint32_t scan_read(const _Atomic uint32_t *value) {
-  return atomic_load_explicit(value, memory_order_relaxed);
-}
+static inline uint32_t scan_read(const _Atomic uint32_t *value) { return atomic_load_explicit(value, memory_order_relaxed); }
 
 /* Since start, modulo 2^32. Readable from any context. */
 struct scan_counters {
@@ -186,9 +184,7 @@ void scan_ask_temperature(struct scan *scan);
 void scan_rest(struct scan *scan, bool resting);
 
 /* The bus is as scan_rest() wants it when resting. Any context. */
-static inline bool scan_rests(const struct scan *scan) {
-  return atomic_load_explicit(&scan->rests, memory_order_relaxed) != 0;
-}
+static inline bool scan_rests(const struct scan *scan) { return atomic_load_explicit(&scan->rests, memory_order_relaxed) != 0; }
 
 /* The sensors convert for a frame. Event context. */
 static inline bool scan_is_converting_frame(const struct scan *scan) {

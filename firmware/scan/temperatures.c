@@ -14,9 +14,7 @@
 
 static bool within(int32_t value, int32_t limit) { return value >= -limit && value <= limit; }
 
-static int16_t clamped_i16(int32_t value) {
-  return (int16_t)(value > INT16_MAX ? INT16_MAX : value < INT16_MIN ? INT16_MIN : value);
-}
+static int16_t clamped_i16(int32_t value) { return (int16_t)(value > INT16_MAX ? INT16_MAX : value < INT16_MIN ? INT16_MIN : value); }
 
 /* What the temperatures of the array show about one of them. */
 struct company {
@@ -24,8 +22,7 @@ struct company {
   bool votes;
 };
 
-static struct company keep_company(const struct readings *readings, uint8_t sensor_count, uint32_t good,
-                                   const int16_t now_cC[]) {
+static struct company keep_company(const struct readings *readings, uint8_t sensor_count, uint32_t good, const int16_t now_cC[]) {
   struct company company = {.votes = false};
   int32_t values[FT_MAX_SENSORS];
   int count = 0;
@@ -55,8 +52,7 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const s
     use = near || (agrees && possible && (readings->pardoned & bit));
     insists = agrees && !use;
   } else {
-    const int32_t most_cC =
-        is_late && !readings->jolted ? READINGS_TEMPERATURE_NEAR_cC : READINGS_TEMPERATURE_STEP_MAX_cC;
+    const int32_t most_cC = is_late && !readings->jolted ? READINGS_TEMPERATURE_NEAR_cC : READINGS_TEMPERATURE_STEP_MAX_cC;
     use = within(now_cC - readings->thermal[k].first_order_cC, most_cC);
     insists = !use && (agrees || readings->jolted);
     readings->jolted |= insists && readings->jolted ? bit : 0;
@@ -111,8 +107,7 @@ static void prove(struct readings *readings, uint8_t sensor_count) {
   readings->was_near = near;
 }
 
-/* Returns the bitmap of those apart that have not read like the others yet. Later they may be
- * apart, as something warm may touch some. */
+/* Returns the bitmap of those apart that have not read like the others yet. Later they may be apart, as something warm may touch some. */
 static uint32_t compare(struct readings *readings, uint8_t sensor_count) {
   if ((readings->has_thermal & ~readings->alike) == 0) {
     return 0;
@@ -148,16 +143,14 @@ static bool is_unusual(const struct readings *readings, uint8_t sensor_count, ui
     return true;
   }
   for (uint8_t k = 0; k < sensor_count; k++) {
-    if ((good & (UINT32_C(1) << k)) &&
-        !within(now_cC[k] - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_STEP_MAX_cC)) {
+    if ((good & (UINT32_C(1) << k)) && !within(now_cC[k] - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_STEP_MAX_cC)) {
       return true;
     }
   }
   return false;
 }
 
-uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count,
-                                   const struct readings_temperature *taken) {
+uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count, const struct readings_temperature *taken) {
   const uint32_t fresh = taken->prom_changed | taken->returned;
   forget(readings, fresh | ~taken->admitted);
   readings->renewed |= taken->prom_changed;
@@ -190,8 +183,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     if (!had || !within(now_cC[k] - thermal->first_order_cC, TEMPERATURE_STILL_cC)) {
       news |= READINGS_MOVED;
     }
-    ms58xx_compensate_temperature(&taken->prom[k], taken->code[k], had ? thermal->branch : MS58XX_BRANCH_UNKNOWN,
-                                  thermal);
+    ms58xx_compensate_temperature(&taken->prom[k], taken->code[k], had ? thermal->branch : MS58XX_BRANCH_UNKNOWN, thermal);
     readings->doubted &= ~bit;
     readings->has_thermal |= bit;
   }
@@ -200,8 +192,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
   readings->jolted &= ~taken->good | readings->suspects;
   news |= readings->jolted & ~readings->suspects ? READINGS_ASK_AGAIN : 0;
   readings->alike &= taken->admitted & ~taken->prom_changed;
-  readings->doubtful =
-      taken->prom_bad | readings->doubted | readings->strange | readings->apart | compare(readings, sensor_count);
+  readings->doubtful = taken->prom_bad | readings->doubted | readings->strange | readings->apart | compare(readings, sensor_count);
   average(readings, sensor_count, taken->admitted);
   if (!(news & READINGS_ASK_AGAIN)) {
     readings->doubts_in_a_row = 0;

@@ -36,11 +36,10 @@ enum {
   /* A flash whose erased slots do not hold what is written so often in a row fails. */
   MAX_ATTEMPTS = 3,
 };
-#define RECORD_BYTES(sensors)                                                                                          \
+#define RECORD_BYTES(sensors)                                                                                                              \
   (PAYLOAD_AT + CALIBRATION_AT + 14 + (8 + PLACE_BYTES) * (sensors) + SETTINGS_BYTES + PROFILE_BYTES + SHAPE_BYTES)
 _Static_assert(RECORD_BYTES(STORE_SENSORS_OF_SHORT_SLOT) <= STORE_SHORT_SLOT_BYTES - 8 &&
-                   RECORD_BYTES(FT_MAX_SENSORS) <= STORE_RECORD_BYTES &&
-                   (int)STORE_RECORD_BYTES <= STORE_LONG_SLOT_BYTES - 8,
+                   RECORD_BYTES(FT_MAX_SENSORS) <= STORE_RECORD_BYTES && (int)STORE_RECORD_BYTES <= STORE_LONG_SLOT_BYTES - 8,
                "a record fits into its slot and into the buffer");
 
 /* The longest erase of a sector takes 400 ms (W25Q16JV), and the longest write of a page 3 ms. */
@@ -96,8 +95,7 @@ static void get_floats(const uint8_t *at, void *to, size_t offset, unsigned coun
 }
 
 _Static_assert(offsetof(struct sensor_calibration, gain_sd) == sizeof(float) &&
-                   offsetof(struct calibration, force_scale_sd) ==
-                       offsetof(struct calibration, force_scale) + sizeof(float) &&
+                   offsetof(struct calibration, force_scale_sd) == offsetof(struct calibration, force_scale) + sizeof(float) &&
                    offsetof(struct store_settings, location_limit_mm) ==
                        offsetof(struct store_settings, slip_threshold_mm) + 3 * sizeof(float),
                "floats lie behind one another");
@@ -196,8 +194,8 @@ static void make_record(struct store *store, const struct parts *parts) {
   unsigned places_at = shape_at + SHAPE_BYTES;
   unsigned length = places_at + PLACE_BYTES * store->sensor_count;
   memset(payload, 0, length);
-  payload[0] = (uint8_t)((parts->calibration ? HAS_CALIBRATION : 0) | (parts->settings ? HAS_SETTINGS : 0) |
-                         (parts->profile ? HAS_PROFILE : 0));
+  payload[0] =
+      (uint8_t)((parts->calibration ? HAS_CALIBRATION : 0) | (parts->settings ? HAS_SETTINGS : 0) | (parts->profile ? HAS_PROFILE : 0));
   payload[1] = store->sensor_count;
   if (parts->calibration) {
     put_calibration(payload + CALIBRATION_AT, parts->calibration, store->sensor_count);
@@ -295,8 +293,7 @@ static bool load_record(struct store *store, unsigned sector, unsigned slot) {
     at += count;
     if (at == PAYLOAD_AT && left == count) { /* the head: now the length is known */
       unsigned length = bytes_get_u16(record + LENGTH_AT);
-      if (bytes_get_u32(record + MAGIC_AT) != MAGIC || length > room - PAYLOAD_AT ||
-          bytes_get_u32(record + GENERATION_AT) == 0) {
+      if (bytes_get_u32(record + MAGIC_AT) != MAGIC || length > room - PAYLOAD_AT || bytes_get_u32(record + GENERATION_AT) == 0) {
         return false;
       }
       store->record_length = (uint16_t)(PAYLOAD_AT + length);
@@ -305,11 +302,8 @@ static bool load_record(struct store *store, unsigned sector, unsigned slot) {
   return bytes_get_u32(record + CRC_AT) == record_crc(store);
 }
 
-/* Generations wrap, past 0, which is none: no flash lives that long, but what else has written
- * to it may have left any. */
-static bool is_older(uint32_t generation, uint32_t than) {
-  return than != 0 && (generation == 0 || generation - than > UINT32_MAX / 2);
-}
+/* Generations wrap, past 0, which is none: no flash lives that long, but what else has written to it may have left any. */
+static bool is_older(uint32_t generation, uint32_t than) { return than != 0 && (generation == 0 || generation - than > UINT32_MAX / 2); }
 
 static uint32_t next_generation(uint32_t generation) { return generation == UINT32_MAX ? 1 : generation + 1; }
 
@@ -401,9 +395,7 @@ static void begin_step(struct store *store, enum store_step step, uint64_t now_u
 
 static uint32_t to_address(const struct store *store) { return slot_address(store, store->to_sector, store->to_slot); }
 
-static void program_mark(const struct store *store, unsigned at) {
-  port_flash_program(to_address(store) + at, mark, sizeof mark);
-}
+static void program_mark(const struct store *store, unsigned at) { port_flash_program(to_address(store) + at, mark, sizeof mark); }
 
 static void begin_erase(struct store *store, uint64_t now_us) {
   port_flash_erase(store->to_sector);
@@ -432,8 +424,7 @@ static void begin_write(struct store *store, uint64_t now_us) {
     begin_slot(store, now_us);
   } else if (store->sure_slot < STORE_SLOTS) {
     /* The seal of what remains may have been cut short itself: made good before the other goes. */
-    port_flash_program(store->sector * PORT_FLASH_SECTOR_BYTES + (store->sure_slot + 1u) * store->sure_slot_bytes - 8,
-                       mark, sizeof mark);
+    port_flash_program(store->sector * PORT_FLASH_SECTOR_BYTES + (store->sure_slot + 1u) * store->sure_slot_bytes - 8, mark, sizeof mark);
     begin_step(store, STORE_SECURE, now_us);
     store->to_sector = !store->sector;
     store->to_slot = 0;
@@ -491,8 +482,7 @@ static bool read_back(struct store *store) {
 
 static struct parts kept_parts(const struct store *store) {
   const struct store_content *content = &store->content;
-  return (struct parts){content->has_calibration ? &content->calibration : NULL,
-                        content->has_settings ? &content->settings : NULL,
+  return (struct parts){content->has_calibration ? &content->calibration : NULL, content->has_settings ? &content->settings : NULL,
                         content->has_profile ? &content->profile : NULL};
 }
 
@@ -516,15 +506,9 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
     return now_us < store->step_ends_us ? FT_PENDING : fail(store, FT_ERR_TIMEOUT);
   }
   switch (store->step) {
-  case STORE_PUT:
-    begin_write(store, now_us);
-    break;
-  case STORE_SECURE:
-    begin_erase(store, now_us);
-    break;
-  case STORE_ERASE:
-    begin_slot(store, now_us);
-    break;
+  case STORE_PUT: begin_write(store, now_us); break;
+  case STORE_SECURE: begin_erase(store, now_us); break;
+  case STORE_ERASE: begin_slot(store, now_us); break;
   case STORE_BEGIN:
   case STORE_WRITE:
     store->at = store->step == STORE_BEGIN ? MAGIC_AT : (uint16_t)(store->at + write_length(store));
@@ -550,8 +534,7 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
     begin_step(store, STORE_END, now_us);
     break;
   default:
-    if (read_u32(to_address(store) + sealed_at(store)) != MARK ||
-        read_u32(to_address(store) + final_at(store)) != MARK) {
+    if (read_u32(to_address(store) + sealed_at(store)) != MARK || read_u32(to_address(store) + final_at(store)) != MARK) {
       return try_again(store, now_us);
     }
     return finish_write(store);

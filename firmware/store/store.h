@@ -16,22 +16,20 @@
  *     504  u32  sealed: 0. The record was read back and is right
  *     508  u32  final: 0. The seal is whole
  *
- * Payload of version 1: u8 parts (bit 0 calibration, bit 1 settings), u8 n sensors, u8 sync pin (a setting, and 0 in
- * the records of firmware without one), u8 0. Then the calibration as in its command, without its n: 14 + 8 n bytes,
- * zeros where there is none. Then the other settings: u32 rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm,
- * f32 f32 prior mm, f32 location limit mm. Version 2 has one more part, bit 2, the pad's profile, behind the settings:
- * as in its command, 177 bytes. Version 3 has the calibration's shape and air at the end: u16 sigma, its sd, the dip's
- * share and sd, u8 kPa; as in its command, which has them before the sensors. Version 4 has one more part at the end:
- * of each sensor i16 i16 i16, its place and width, as in the command; 6 n bytes. Before it, 512 bytes were enough for
- * all arrays. A sector with such a record has slots of 512 bytes and counts as full. Later versions keep the slot as it
- * is and change the payload.
+ * Payload of version 1: u8 parts (bit 0 calibration, bit 1 settings), u8 n sensors, u8 sync pin (a setting, and 0 in the records of
+ * firmware without one), u8 0. Then the calibration as in its command, without its n: 14 + 8 n bytes, zeros where there is none. Then the
+ * other settings: u32 rate mHz, u16 OSR, u16 slip window ms, f32 slip threshold mm, f32 f32 prior mm, f32 location limit mm. Version 2 has
+ * one more part, bit 2, the pad's profile, behind the settings: as in its command, 177 bytes. Version 3 has the calibration's shape and air
+ * at the end: u16 sigma, its sd, the dip's share and sd, u8 kPa; as in its command, which has them before the sensors. Version 4 has one
+ * more part at the end: of each sensor i16 i16 i16, its place and width, as in the command; 6 n bytes. Before it, 512 bytes were enough for
+ * all arrays. A sector with such a record has slots of 512 bytes and counts as full. Later versions keep the slot as it is and change the
+ * payload.
  *
- * Bits whose change was cut short may read differently each time. So a record that is not final may be there today and
- * gone tomorrow, or the other way round. When start-up meets one, it writes the content that it chose once more, behind
- * it. A mark is all zeros, so writing it again repairs one that was cut short. Before `begun` is whole no other bit of
- * the slot is touched, and a slot without it is free. If it does not hold what is written, the other sector is erased
- * and taken. A sector is erased only while the other one holds a record whose seal is whole, or if all its own records
- * were cut short.
+ * Bits whose change was cut short may read differently each time. So a record that is not final may be there today and gone tomorrow, or
+ * the other way round. When start-up meets one, it writes the content that it chose once more, behind it. A mark is all zeros, so writing
+ * it again repairs one that was cut short. Before `begun` is whole no other bit of the slot is touched, and a slot without it is free. If
+ * it does not hold what is written, the other sector is erased and taken. A sector is erased only while the other one holds a record whose
+ * seal is whole, or if all its own records were cut short.
  *
  * Main context only. Nothing waits: store_poll() takes a write one short step further. */
 #pragma once
@@ -109,8 +107,7 @@ struct store {
   uint8_t record[STORE_RECORD_BYTES];
 };
 
-/* Reads the flash; about 1 ms. sensor_count: the fingertip's, 1 to FT_MAX_SENSORS; a calibration of
- * another array is damage. */
+/* Reads the flash; about 1 ms. sensor_count: the fingertip's, 1 to FT_MAX_SENSORS; a calibration of another array is damage. */
 void store_init(struct store *store, uint8_t sensor_count);
 
 /* Begin to keep this instead of the present content; NULL: keep none. The value may go as soon as
@@ -124,6 +121,4 @@ enum ft_status store_put_profile(struct store *store, const struct pad_profile *
  * FT_PENDING, once: FT_ERR_TIMEOUT, FT_ERR_CRC: the flash has failed, and .content is as before. */
 enum ft_status store_poll(struct store *store, uint64_t now_us);
 
-static inline bool store_is_writing(const struct store *store) {
-  return store->step != STORE_IDLE || store->must_settle;
-}
+static inline bool store_is_writing(const struct store *store) { return store->step != STORE_IDLE || store->must_settle; }

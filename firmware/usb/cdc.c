@@ -49,8 +49,7 @@ static void add_news(void) {
 }
 
 static __attribute__((noinline, cold)) size_t take_after_cut(void) {
-  const uint32_t length =
-      ring_take(&transmit_ring, port.packet + CUT_MARK_BYTES, USB_MAX_PACKET_BYTES - CUT_MARK_BYTES);
+  const uint32_t length = ring_take(&transmit_ring, port.packet + CUT_MARK_BYTES, USB_MAX_PACKET_BYTES - CUT_MARK_BYTES);
   if (length == 0)
     return 0;
   memset(port.packet, 0, CUT_MARK_BYTES);
@@ -77,8 +76,7 @@ static void transmit(void) {
 
 /* While the ring lacks room for a whole packet the endpoint accepts none and the host waits. */
 static void accept_packet(void) {
-  if (port.configured && !device_endpoint_is_halted(CDC_ENDPOINT_OUT) &&
-      ring_space(&receive_ring) >= USB_MAX_PACKET_BYTES)
+  if (port.configured && !device_endpoint_is_halted(CDC_ENDPOINT_OUT) && ring_space(&receive_ring) >= USB_MAX_PACKET_BYTES)
     usb_controller_receive(CDC_ENDPOINT_OUT);
 }
 
@@ -119,8 +117,7 @@ enum control_answer cdc_on_request(const struct usb_setup *setup, uint8_t *data,
   if (setup->index != CDC_INTERFACE_CONTROL)
     return CONTROL_STALL;
   switch (setup->type << 8 | setup->request) {
-  case TO_CONTROL_INTERFACE << 8 | SET_LINE_CODING:
-    return setup->length == LINE_CODING_BYTES ? CONTROL_RECEIVE : CONTROL_STALL;
+  case TO_CONTROL_INTERFACE << 8 | SET_LINE_CODING: return setup->length == LINE_CODING_BYTES ? CONTROL_RECEIVE : CONTROL_STALL;
   case FROM_CONTROL_INTERFACE << 8 | GET_LINE_CODING:
     memcpy(data, port.line_coding, LINE_CODING_BYTES);
     *length = LINE_CODING_BYTES;
@@ -130,10 +127,8 @@ enum control_answer cdc_on_request(const struct usb_setup *setup, uint8_t *data,
       return CONTROL_STALL;
     set_control_lines(setup->value);
     return CONTROL_DONE;
-  case TO_CONTROL_INTERFACE << 8 | SEND_BREAK:
-    return setup->length == 0 ? CONTROL_DONE : CONTROL_STALL;
-  default:
-    return CONTROL_STALL;
+  case TO_CONTROL_INTERFACE << 8 | SEND_BREAK: return setup->length == 0 ? CONTROL_DONE : CONTROL_STALL;
+  default: return CONTROL_STALL;
   }
 }
 

@@ -1,8 +1,7 @@
 /* A USB CDC ACM device: the byte stream between the fingertip and its host.
  *
- * Sources: Universal Serial Bus Specification 2.0 chapter 9; USB Class Definitions for Communications Devices 1.2 and
- * its PSTN subclass 1.2 (ACM). The controller is the board's, behind port/usb_controller.h. Exactly one exists per
- * image.
+ * Sources: Universal Serial Bus Specification 2.0 chapter 9; USB Class Definitions for Communications Devices 1.2 and its PSTN subclass 1.2
+ * (ACM). The controller is the board's, behind port/usb_controller.h. Exactly one exists per image.
  *
  * Interrupt context serves the controller; the functions below are for the main context. Between the two are
  * single-producer single-consumer rings, so nothing here locks or waits. */
@@ -40,9 +39,8 @@ uint32_t cdc_news(void);
  * then, and a host that comes back must ask for them again. */
 uint32_t cdc_close_count(void);
 
-/* Queues all of the bytes or none; those of whole words cost less. FT_ERR_SPACE: the queue is too
- * full. FT_ERR_ARGUMENT: longer than the queue will ever hold. Bytes queued while the port is
- * closed are discarded at once. */
+/* Queues all of the bytes or none; those of whole words cost less. FT_ERR_SPACE: the queue is too full. FT_ERR_ARGUMENT: longer than the
+ * queue will ever hold. Bytes queued while the port is closed are discarded at once. */
 enum ft_status cdc_write(const uint8_t *bytes, size_t length);
 
 /* The first bytes that are queued after an opening, or after the stream was cut in another way,

@@ -31,8 +31,8 @@ static const uint8_t configuration_descriptor[] = {
     7, 5,    0x02, 2,    64, 0,  0,            /* bulk, from the host */
     7, 5,    0x82, 2,    64, 0,  0,            /* bulk, to the host */
 };
-_Static_assert(CDC_ENDPOINT_NOTIFY == 0x81 && CDC_ENDPOINT_OUT == 0x02 && CDC_ENDPOINT_IN == 0x82 &&
-                   CDC_INTERFACES == 2 && CDC_INTERFACE_CONTROL == 0 && USB_MAX_PACKET_BYTES == 64,
+_Static_assert(CDC_ENDPOINT_NOTIFY == 0x81 && CDC_ENDPOINT_OUT == 0x02 && CDC_ENDPOINT_IN == 0x82 && CDC_INTERFACES == 2 &&
+                   CDC_INTERFACE_CONTROL == 0 && USB_MAX_PACKET_BYTES == 64,
                "the table has them as numbers");
 _Static_assert(sizeof configuration_descriptor == CONFIGURATION_BYTES, "wTotalLength");
 _Static_assert(sizeof configuration_descriptor <= DESCRIPTOR_MAX_BYTES, "buffer of an answer");
@@ -53,8 +53,7 @@ static size_t write_string(uint8_t to[DESCRIPTOR_MAX_BYTES], const char *text) {
   return length;
 }
 
-size_t descriptor_write(const struct cdc_identity *identity, uint16_t type_and_index,
-                        uint8_t to[DESCRIPTOR_MAX_BYTES]) {
+size_t descriptor_write(const struct cdc_identity *identity, uint16_t type_and_index, uint8_t to[DESCRIPTOR_MAX_BYTES]) {
   switch (type_and_index) {
   case DESCRIPTOR_DEVICE << 8:
     write_bytes(to, device_descriptor, sizeof device_descriptor);
@@ -62,17 +61,11 @@ size_t descriptor_write(const struct cdc_identity *identity, uint16_t type_and_i
     bytes_put_u16(to + 10, identity->product_id);
     bytes_put_u16(to + 12, identity->device_version_bcd);
     return sizeof device_descriptor;
-  case DESCRIPTOR_CONFIGURATION << 8:
-    return write_bytes(to, configuration_descriptor, sizeof configuration_descriptor);
-  case DESCRIPTOR_STRING << 8 | STRING_LANGUAGES:
-    return write_bytes(to, languages_descriptor, sizeof languages_descriptor);
-  case DESCRIPTOR_STRING << 8 | STRING_MANUFACTURER:
-    return write_string(to, identity->manufacturer);
-  case DESCRIPTOR_STRING << 8 | STRING_PRODUCT:
-    return write_string(to, identity->product);
-  case DESCRIPTOR_STRING << 8 | STRING_SERIAL:
-    return write_string(to, identity->serial);
-  default:
-    return 0;
+  case DESCRIPTOR_CONFIGURATION << 8: return write_bytes(to, configuration_descriptor, sizeof configuration_descriptor);
+  case DESCRIPTOR_STRING << 8 | STRING_LANGUAGES: return write_bytes(to, languages_descriptor, sizeof languages_descriptor);
+  case DESCRIPTOR_STRING << 8 | STRING_MANUFACTURER: return write_string(to, identity->manufacturer);
+  case DESCRIPTOR_STRING << 8 | STRING_PRODUCT: return write_string(to, identity->product);
+  case DESCRIPTOR_STRING << 8 | STRING_SERIAL: return write_string(to, identity->serial);
+  default: return 0;
   }
 }

@@ -21,6 +21,5 @@ enum {
   DESCRIPTOR_MAX_BYTES = 128,
 };
 
-/* Writes the descriptor and returns its length; 0: the device has no such descriptor.
- * type_and_index is wValue of GET_DESCRIPTOR. */
+/* Writes the descriptor and returns its length; 0: the device has no such descriptor. type_and_index is wValue of GET_DESCRIPTOR. */
 size_t descriptor_write(const struct cdc_identity *identity, uint16_t type_and_index, uint8_t to[DESCRIPTOR_MAX_BYTES]);

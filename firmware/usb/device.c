@@ -115,8 +115,7 @@ static enum control_answer set_configuration(uint16_t value) {
 
 static enum control_answer on_device_request(const struct usb_setup *setup, size_t *length) {
   switch (setup->request) {
-  case GET_STATUS:
-    return send_status(false, length); /* powered by the bus, no remote wake-up */
+  case GET_STATUS: return send_status(false, length); /* powered by the bus, no remote wake-up */
   case SET_ADDRESS:
     if (device.state == STATE_CONFIGURED || setup->value > 127)
       return CONTROL_STALL;
@@ -128,10 +127,8 @@ static enum control_answer on_device_request(const struct usb_setup *setup, size
     device.data[0] = device.state == STATE_CONFIGURED ? 1 : 0;
     *length = 1;
     return CONTROL_SEND;
-  case SET_CONFIGURATION:
-    return set_configuration(setup->value);
-  default:
-    return CONTROL_STALL;
+  case SET_CONFIGURATION: return set_configuration(setup->value);
+  default: return CONTROL_STALL;
   }
 }
 
@@ -139,8 +136,7 @@ static enum control_answer on_interface_request(const struct usb_setup *setup, s
   if (device.state != STATE_CONFIGURED || setup->index >= CDC_INTERFACES)
     return CONTROL_STALL;
   switch (setup->request) {
-  case GET_STATUS:
-    return send_status(false, length);
+  case GET_STATUS: return send_status(false, length);
   case GET_INTERFACE:
     device.data[0] = 0;
     *length = 1;
@@ -152,8 +148,7 @@ static enum control_answer on_interface_request(const struct usb_setup *setup, s
     if (setup->index == CDC_INTERFACE_DATA)
       cdc_on_interface_set();
     return CONTROL_DONE;
-  default:
-    return CONTROL_STALL;
+  default: return CONTROL_STALL;
   }
 }
 
@@ -166,12 +161,9 @@ static enum control_answer on_endpoint_request(const struct usb_setup *setup, si
       return CONTROL_STALL;
     return send_status(!control && device.halted[i], length);
   }
-  case CLEAR_FEATURE:
-    return set_halt(setup, false);
-  case SET_FEATURE:
-    return set_halt(setup, true);
-  default:
-    return CONTROL_STALL;
+  case CLEAR_FEATURE: return set_halt(setup, false);
+  case SET_FEATURE: return set_halt(setup, true);
+  default: return CONTROL_STALL;
   }
 }
 
@@ -182,19 +174,15 @@ static enum control_answer on_request(const struct usb_setup *setup, size_t *len
     return cdc_on_request(setup, device.data, length);
   }
   /* The direction is fixed for each standard request, and 1 where it answers with data. */
-  bool answers = setup->request == GET_STATUS || setup->request == GET_DESCRIPTOR ||
-                 setup->request == GET_CONFIGURATION || setup->request == GET_INTERFACE;
+  bool answers = setup->request == GET_STATUS || setup->request == GET_DESCRIPTOR || setup->request == GET_CONFIGURATION ||
+                 setup->request == GET_INTERFACE;
   if (answers != ((setup->type & DIRECTION_IN) != 0) || (!answers && setup->length != 0))
     return CONTROL_STALL;
   switch (setup->type & ~DIRECTION_IN) {
-  case TO_DEVICE:
-    return on_device_request(setup, length);
-  case TO_INTERFACE:
-    return on_interface_request(setup, length);
-  case TO_ENDPOINT:
-    return on_endpoint_request(setup, length);
-  default:
-    return CONTROL_STALL;
+  case TO_DEVICE: return on_device_request(setup, length);
+  case TO_INTERFACE: return on_interface_request(setup, length);
+  case TO_ENDPOINT: return on_endpoint_request(setup, length);
+  default: return CONTROL_STALL;
   }
 }
 
@@ -213,9 +201,7 @@ static size_t next_packet_bytes(void) {
   return rest < USB_MAX_PACKET_BYTES ? rest : USB_MAX_PACKET_BYTES;
 }
 
-static void send_next_packet(void) {
-  usb_controller_send(USB_ENDPOINT_IN, device.data + device.done, next_packet_bytes());
-}
+static void send_next_packet(void) { usb_controller_send(USB_ENDPOINT_IN, device.data + device.done, next_packet_bytes()); }
 
 void usb_device_on_setup(const uint8_t packet[USB_SETUP_BYTES]) {
   struct usb_setup *setup = &device.setup;
@@ -229,12 +215,8 @@ void usb_device_on_setup(const uint8_t packet[USB_SETUP_BYTES]) {
   device.done = 0;
   size_t length = 0;
   switch (on_request(setup, &length)) {
-  case CONTROL_STALL:
-    stall_control();
-    break;
-  case CONTROL_DONE:
-    start_status_in();
-    break;
+  case CONTROL_STALL: stall_control(); break;
+  case CONTROL_DONE: start_status_in(); break;
   case CONTROL_SEND:
     device.length = length < setup->length ? length : setup->length;
     device.stage = STAGE_DATA_IN;

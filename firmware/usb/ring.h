@@ -1,6 +1,5 @@
-/* A byte queue between one producer and one consumer in different contexts, without locks. Each side stores its own
- * index and only reads the other's, so plain atomic loads and stores suffice. Lengths and buffers that are multiples of
- * 4 bytes are copied by words. */
+/* A byte queue between one producer and one consumer in different contexts, without locks. Each side stores its own index and only reads
+ * the other's, so plain atomic loads and stores suffice. Lengths and buffers that are multiples of 4 bytes are copied by words. */
 #pragma once
 
 #include <stdatomic.h>

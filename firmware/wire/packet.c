@@ -35,10 +35,9 @@ struct wire_layout {
   const struct run *runs;
 };
 
-#define RUN(kind, count, field)                                                                                        \
+#define RUN(kind, count, field)                                                                                                            \
   { kind, count, offsetof(struct wire_packet, body.field) }
-#define LAYOUT(name, type)                                                                                             \
-  const struct wire_layout name##_layout = {type, sizeof name##_runs / sizeof name##_runs[0], name##_runs}
+#define LAYOUT(name, type) const struct wire_layout name##_layout = {type, sizeof name##_runs / sizeof name##_runs[0], name##_runs}
 static const struct run no_runs[1]; /* NULL has no end to go to */
 #define EMPTY_LAYOUT(name, type) const struct wire_layout name##_layout = {type, 0, no_runs}
 _Static_assert(offsetof(struct sensor_calibration, gain_sd) == 4 &&
@@ -47,8 +46,7 @@ _Static_assert(offsetof(struct sensor_calibration, gain_sd) == 4 &&
                "SENSORS_F32, SENSORS_U16");
 _Static_assert(offsetof(struct wire_packet, body.raw.baseline_Pa_q10) ==
                        offsetof(struct wire_packet, body.raw.pressure_Pa_q10) + 4 * FT_MAX_SENSORS &&
-                   offsetof(struct wire_packet, body.info.y_mm) ==
-                       offsetof(struct wire_packet, body.info.x_mm) + 4 * FT_MAX_SENSORS,
+                   offsetof(struct wire_packet, body.info.y_mm) == offsetof(struct wire_packet, body.info.x_mm) + 4 * FT_MAX_SENSORS,
                "PAIRS");
 
 _Static_assert(offsetof(struct crash_record, r0) % 4 == 0 &&
@@ -164,27 +162,16 @@ static bool put_run(struct writer *writer, uint8_t kind, const uint8_t *field, u
     return put_u32(writer, field, count);
   }
   switch (kind) {
-  case TEXTS:
-    put_bytes(writer, field, count * WIRE_TEXT_BYTES);
-    return is_text(field, count * WIRE_TEXT_BYTES);
-  case U16:
-    put_u16(writer, field, count);
-    return true;
+  case TEXTS: put_bytes(writer, field, count * WIRE_TEXT_BYTES); return is_text(field, count * WIRE_TEXT_BYTES);
+  case U16: put_u16(writer, field, count); return true;
   case U64:
     memcpy(&wide, field, sizeof wide);
     put_u64(writer, wide);
     return true;
-  case U32:
-    put_u32(writer, field, count);
-    return true;
-  case PAIRS:
-    put_pairs(writer, field, count);
-    return true;
-  case F32_PAIRS:
-    return put_pairs(writer, field, count);
-  default:
-    put_bytes(writer, field, count);
-    return true;
+  case U32: put_u32(writer, field, count); return true;
+  case PAIRS: put_pairs(writer, field, count); return true;
+  case F32_PAIRS: return put_pairs(writer, field, count);
+  default: put_bytes(writer, field, count); return true;
   }
 }
 
@@ -205,9 +192,7 @@ static bool get_run(const uint8_t *at, uint8_t kind, uint8_t *field, unsigned co
   uint64_t wide;
   uint16_t half;
   switch (kind) {
-  case TEXTS:
-    memcpy(field, at, count * WIRE_TEXT_BYTES);
-    return is_text(field, count * WIRE_TEXT_BYTES);
+  case TEXTS: memcpy(field, at, count * WIRE_TEXT_BYTES); return is_text(field, count * WIRE_TEXT_BYTES);
   case U16:
     for (; count > 0; count--, at += 2, field += 2) {
       half = bytes_get_u16(at);
@@ -218,19 +203,11 @@ static bool get_run(const uint8_t *at, uint8_t kind, uint8_t *field, unsigned co
     wide = bytes_get_u64(at);
     memcpy(field, &wide, sizeof wide);
     return true;
-  case U32:
-    get_u32(at, field, count, false);
-    return true;
-  case PAIRS:
-    get_u32(at, field, 2 * count, true);
-    return true;
-  case F32:
-    return get_u32(at, field, count, false);
-  case F32_PAIRS:
-    return get_u32(at, field, 2 * count, true);
-  default:
-    memcpy(field, at, count);
-    return true;
+  case U32: get_u32(at, field, count, false); return true;
+  case PAIRS: get_u32(at, field, 2 * count, true); return true;
+  case F32: return get_u32(at, field, count, false);
+  case F32_PAIRS: return get_u32(at, field, 2 * count, true);
+  default: memcpy(field, at, count); return true;
   }
 }
 
@@ -282,11 +259,8 @@ static bool put_body(const struct wire_layout *layout, const uint8_t *packet, st
   return true;
 }
 
-static const uint8_t bytes_of_kind[] = {[BYTES] = 1,        [TEXTS] = WIRE_TEXT_BYTES,
-                                        [SENSOR_COUNT] = 1, [U16] = 2,
-                                        [U32] = 4,          [U64] = 8,
-                                        [F32] = 4,          [PAIRS] = 8,
-                                        [F32_PAIRS] = 8};
+static const uint8_t bytes_of_kind[] = {
+    [BYTES] = 1, [TEXTS] = WIRE_TEXT_BYTES, [SENSOR_COUNT] = 1, [U16] = 2, [U32] = 4, [U64] = 8, [F32] = 4, [PAIRS] = 8, [F32_PAIRS] = 8};
 
 /* False: a value is refused, or the body has another length. */
 static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t length, uint8_t *packet) {
@@ -317,8 +291,8 @@ static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t
   return length == 0;
 }
 
-enum ft_status wire_encode(const struct wire_layout *layout, const struct wire_packet *packet,
-                           uint8_t frame[WIRE_MAX_FRAME_BYTES], size_t *length) {
+enum ft_status wire_encode(const struct wire_layout *layout, const struct wire_packet *packet, uint8_t frame[WIRE_MAX_FRAME_BYTES],
+                           size_t *length) {
   if (!layout) {
     return FT_ERR_ARGUMENT;
   }
@@ -335,8 +309,7 @@ enum ft_status wire_encode(const struct wire_layout *layout, const struct wire_p
   return FT_OK;
 }
 
-enum ft_status wire_decode(const struct wire_layout *const *set, uint8_t *frame, size_t length,
-                           struct wire_packet *packet) {
+enum ft_status wire_decode(const struct wire_layout *const *set, uint8_t *frame, size_t length, struct wire_packet *packet) {
   size_t used = cobs_decode(frame, length);
   if (used < WIRE_HEADER_BYTES + WIRE_CRC_BYTES) {
     return FT_ERR_FORMAT;

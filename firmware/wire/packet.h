@@ -5,9 +5,8 @@
  * and nothing on the line depends on the byte order, the alignment or the structure padding of the machine. Floats are
  * IEEE 754 binary32 and always finite: the encoder refuses others and the decoder rejects them.
  *
- * line.toml describes the bodies; bodies.h has them as structs, with their units and ranges. Each has
- * one constant, its layout, for both directions. Code that encodes or decodes names its layouts, so an
- * image holds those of its own packets and commands only. */
+ * line.toml describes the bodies; bodies.h has them as structs, with their units and ranges. Each has one constant, its layout, for both
+ * directions. Code that encodes or decodes names its layouts, so an image holds those of its own packets and commands only. */
 #pragma once
 
 #include "common/status.h"
@@ -41,18 +40,16 @@ const struct wire_layout *wire_find_layout(const struct wire_layout *const *set,
 /* Encodes one packet by its layout, which has its type too, into a complete frame, delimiter included: *length bytes.
  * FT_ERR_ARGUMENT: layout is NULL, sensor_count is 0 or too large, a text is not printable, or a float is not finite;
  * frame is scratch then. Cost: about 40 Cortex-M0+ cycles a byte. */
-enum ft_status wire_encode(const struct wire_layout *layout, const struct wire_packet *packet,
-                           uint8_t frame[WIRE_MAX_FRAME_BYTES], size_t *length);
+enum ft_status wire_encode(const struct wire_layout *layout, const struct wire_packet *packet, uint8_t frame[WIRE_MAX_FRAME_BYTES],
+                           size_t *length);
 
 /* Decodes the bytes of one frame without its delimiter. The frame buffer is overwritten. FT_ERR_FORMAT: bad COBS, wrong
  * length for the type, or a value that the encoder would refuse. FT_ERR_CRC. FT_ERR_VERSION: another protocol version,
  * the CRC being right. FT_ERR_TYPE: of a type that the set lacks but undamaged; type, sequence and t_us are set, so
  * that the sender can be answered and its sequence followed. */
-enum ft_status wire_decode(const struct wire_layout *const *set, uint8_t *frame, size_t length,
-                           struct wire_packet *packet);
+enum ft_status wire_decode(const struct wire_layout *const *set, uint8_t *frame, size_t length, struct wire_packet *packet);
 
-/* Collects bytes from a line into packets. Resynchronisation: whatever happened, the next frame begins after the next
- * 0x00. */
+/* Collects bytes from a line into packets. Resynchronisation: whatever happened, the next frame begins after the next 0x00. */
 struct wire_receiver {
   const struct wire_layout *const *set;
   uint8_t frame[WIRE_MAX_FRAME_BYTES];
@@ -62,7 +59,6 @@ struct wire_receiver {
 
 void wire_receiver_init(struct wire_receiver *receiver, const struct wire_layout *const *set);
 
-/* Takes one byte. FT_PENDING: no frame is complete. FT_OK: *packet is a new packet. Else a damaged frame ended here and
- * was discarded, for the reason given by wire_decode, or FT_ERR_SPACE for an overlong one. Empty frames (two delimiters
- * in a row) are legal fill. */
+/* Takes one byte. FT_PENDING: no frame is complete. FT_OK: *packet is a new packet. Else a damaged frame ended here and was discarded, for
+ * the reason given by wire_decode, or FT_ERR_SPACE for an overlong one. Empty frames (two delimiters in a row) are legal fill. */
 enum ft_status wire_receive(struct wire_receiver *receiver, uint8_t byte, struct wire_packet *packet);

@@ -1,9 +1,8 @@
 /* A worker beside the main loop: the main loop asks it about one frame, and it answers with one result.
  *
- * Both share one job and nothing else. The one that owns the job reads and writes it, and the other does not look at
- * it. The main loop owns a free job. worker_ask() gives it to the worker, and worker_serve() gives it back with the
- * answer in it. Each of the two counts has one writer, so plain atomic loads and stores suffice, between contexts of
- * one processor and between two processors that share memory.
+ * Both share one job and nothing else. The one that owns the job reads and writes it, and the other does not look at it. The main loop owns
+ * a free job. worker_ask() gives it to the worker, and worker_serve() gives it back with the answer in it. Each of the two counts has one
+ * writer, so plain atomic loads and stores suffice, between contexts of one processor and between two processors that share memory.
  *
  * A single processor serves itself, right after it has asked. The work depends on the job alone, so the answer has the
  * same bits wherever it is done.

@@ -55,8 +55,7 @@ std::vector<std::string> lacks_for_grasp(const wire_info &info, bool needs_load)
     lacks.push_back("forces may be off by some 10 %: fingertip calibrate");
   }
   if (info.rate_mHz != 0 && info.rate_mHz < RATE_mHz) {
-    lacks.push_back("sees slides late at " + fixed(info.rate_mHz / 1e3, 1) +
-                    " frames a second: fingertip set rate=max");
+    lacks.push_back("sees slides late at " + fixed(info.rate_mHz / 1e3, 1) + " frames a second: fingertip set rate=max");
   }
   return lacks;
 }

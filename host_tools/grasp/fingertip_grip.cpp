@@ -12,23 +12,18 @@ using namespace fingertip;
 using namespace fingertip::values;
 
 static GripperTraits traits_of(const fingertip_grip_traits &given) {
-  const double all[] = {given.stroke_mm,      given.step_mm,     given.speed_min_mm_s,
-                        given.speed_max_mm_s, given.deadband_mm, given.force_min_N,
-                        given.force_max_N,    given.latency_s,   given.poll_s};
+  const double all[] = {given.stroke_mm,   given.step_mm,     given.speed_min_mm_s, given.speed_max_mm_s, given.deadband_mm,
+                        given.force_min_N, given.force_max_N, given.latency_s,      given.poll_s};
   for (const double &value : all) {
     if (!(std::isfinite(value) && value >= 0.0 && (value > 0.0 || &value - all >= 4))) {
-      throw Error(ErrorCode::bad_value,
-                  "a gripper's traits are numbers of at least 0; stroke, step and speeds above 0");
+      throw Error(ErrorCode::bad_value, "a gripper's traits are numbers of at least 0; stroke, step and speeds above 0");
     }
   }
-  return {"gripper",         given.stroke_mm,      given.step_mm,
-          given.deadband_mm, given.speed_min_mm_s, given.speed_max_mm_s,
-          given.force_min_N, given.force_max_N,    given.latency_s,
-          given.poll_s};
+  return {"gripper",         given.stroke_mm,   given.step_mm,   given.deadband_mm, given.speed_min_mm_s, given.speed_max_mm_s,
+          given.force_min_N, given.force_max_N, given.latency_s, given.poll_s};
 }
 
-static GripSettings settings_of(const GripperTraits &traits, const char *const *names, const double *values,
-                                size_t count) {
+static GripSettings settings_of(const GripperTraits &traits, const char *const *names, const double *values, size_t count) {
   std::map<std::string, double> wanted;
   for (std::size_t i = 0; i < count && names && values; i++) {
     const GraspSetting &setting = setting_of_field(names[i]);
@@ -56,8 +51,8 @@ struct fingertip_grip {
   Grip grip;
 };
 
-struct fingertip_grip *fingertip_grip_new(const struct fingertip_grip_traits *traits, const char *const *names,
-                                          const double *values, size_t count) {
+struct fingertip_grip *fingertip_grip_new(const struct fingertip_grip_traits *traits, const char *const *names, const double *values,
+                                          size_t count) {
   fingertip_grip *made = nullptr;
   guarded([&] {
     if (!traits) {
@@ -73,8 +68,7 @@ struct fingertip_grip *fingertip_grip_new(const struct fingertip_grip_traits *tr
 
 void fingertip_grip_free(struct fingertip_grip *grip) { delete grip; }
 
-enum fingertip_status fingertip_grip_set(struct fingertip_grip *grip, const char *const *names, const double *values,
-                                         size_t count) {
+enum fingertip_status fingertip_grip_set(struct fingertip_grip *grip, const char *const *names, const double *values, size_t count) {
   return guarded([&] {
     if (!grip) {
       return null();
@@ -99,8 +93,8 @@ enum fingertip_status fingertip_grip_setting(const struct fingertip_grip *grip, 
   });
 }
 
-enum fingertip_status fingertip_grip_take_contact(struct fingertip_grip *grip, size_t finger, double t_s,
-                                                  const double *values, size_t count) {
+enum fingertip_status fingertip_grip_take_contact(struct fingertip_grip *grip, size_t finger, double t_s, const double *values,
+                                                  size_t count) {
   return guarded([&] {
     if (!grip || !values || finger >= GRIP_FINGERS || count != count_of(WIRE_CONTACT) || !(t_s >= 0.0)) {
       return failed(FINGERTIP_ERR_ARGUMENT, "give a contact packet's numbers, finger 0 or 1, and a time");
@@ -113,8 +107,7 @@ enum fingertip_status fingertip_grip_take_contact(struct fingertip_grip *grip, s
   });
 }
 
-enum fingertip_status fingertip_grip_take_answer(struct fingertip_grip *grip,
-                                                 const struct fingertip_grip_answer *answer) {
+enum fingertip_status fingertip_grip_take_answer(struct fingertip_grip *grip, const struct fingertip_grip_answer *answer) {
   if (!grip || !answer || !(answer->t_s >= 0.0) || !std::isfinite(answer->width_mm)) {
     return failed(FINGERTIP_ERR_ARGUMENT, "an answer has a time and a width");
   }
@@ -132,8 +125,7 @@ enum fingertip_status fingertip_grip_ask(struct fingertip_grip *grip, enum finge
   return !grip ? null() : grip->grip.request(request) ? FINGERTIP_OK : FINGERTIP_END;
 }
 
-enum fingertip_status fingertip_grip_step(struct fingertip_grip *grip, double now_s,
-                                          struct fingertip_grip_command *command,
+enum fingertip_status fingertip_grip_step(struct fingertip_grip *grip, double now_s, struct fingertip_grip_command *command,
                                           struct fingertip_grip_report *report) {
   if (!grip || !command || !report || !(now_s >= 0.0)) {
     return failed(FINGERTIP_ERR_ARGUMENT, "give a time, and where to write command and report");
@@ -144,10 +136,6 @@ enum fingertip_status fingertip_grip_step(struct fingertip_grip *grip, double no
   return FINGERTIP_OK;
 }
 
-size_t fingertip_grip_state_name(uint8_t state, char *text, size_t size) {
-  return put_text(state_name(state), text, size);
-}
+size_t fingertip_grip_state_name(uint8_t state, char *text, size_t size) { return put_text(state_name(state), text, size); }
 
-size_t fingertip_grip_trouble_names(uint32_t trouble, char *text, size_t size) {
-  return put_text(trouble_names(trouble), text, size);
-}
+size_t fingertip_grip_trouble_names(uint32_t trouble, char *text, size_t size) { return put_text(trouble_names(trouble), text, size); }

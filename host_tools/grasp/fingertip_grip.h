@@ -10,10 +10,9 @@
  *     fingertip_grip_step(grip, now_s, &command, &report);
  *   }
  *
- * Handles, threads and errors: see fingertip.h. Forces are N, lengths mm, of one fingertip: its normal
- * force is the grip force. Times are s, at least 0, on one clock of the caller's for all inputs; the
- * library has none. What a step and its inputs do is decided by these inputs alone. They wait for
- * nothing and allocate nothing, errors apart. Together they take about 2 us on a desktop computer. */
+ * Handles, threads and errors: see fingertip.h. Forces are N, lengths mm, of one fingertip: its normal force is the grip force. Times are
+ * s, at least 0, on one clock of the caller's for all inputs; the library has none. What a step and its inputs do is decided by these
+ * inputs alone. They wait for nothing and allocate nothing, errors apart. Together they take about 2 us on a desktop computer. */
 #ifndef FINGERTIP_GRIP_H
 #define FINGERTIP_GRIP_H
 
@@ -135,30 +134,27 @@ struct fingertip_grip_report {
   double delay_s; /* from a fingertip's measurement to the controller */
 };
 
-/* Settings: settings.hpp has their names (cap_N, mass_kg, ...), in the units of these names. A setting
- * that is not given has the gripper's default. set_N chooses the mode that holds this force. NULL:
- * fingertip_error has the setting and its range. */
+/* Settings: settings.hpp has their names (cap_N, mass_kg, ...), in the units of these names. A setting that is not given has the gripper's
+ * default. set_N chooses the mode that holds this force. NULL: fingertip_error has the setting and its range. */
 struct fingertip_grip;
-struct fingertip_grip *fingertip_grip_new(const struct fingertip_grip_traits *traits, const char *const *names,
-                                          const double *values, size_t count);
+struct fingertip_grip *fingertip_grip_new(const struct fingertip_grip_traits *traits, const char *const *names, const double *values,
+                                          size_t count);
 void fingertip_grip_free(struct fingertip_grip *grip);
 /* Other settings from the next step on, in any state; what is not given has its default again. FINGERTIP_ERR_VALUE: out
  * of range, or of the other mode; all stay as they were. */
-enum fingertip_status fingertip_grip_set(struct fingertip_grip *grip, const char *const *names, const double *values,
-                                         size_t count);
+enum fingertip_status fingertip_grip_set(struct fingertip_grip *grip, const char *const *names, const double *values, size_t count);
 enum fingertip_status fingertip_grip_setting(const struct fingertip_grip *grip, const char *name, double *value);
 
 /* A contact packet's numbers, fingertip_value_count(0x01); what is no number counts as 0. finger: 0 or 1. t_s: when it
  * was measured. A packet that is no newer than the last is ignored. */
-enum fingertip_status fingertip_grip_take_contact(struct fingertip_grip *grip, size_t finger, double t_s,
-                                                  const double *values, size_t count);
-enum fingertip_status fingertip_grip_take_answer(struct fingertip_grip *grip,
-                                                 const struct fingertip_grip_answer *answer);
+enum fingertip_status fingertip_grip_take_contact(struct fingertip_grip *grip, size_t finger, double t_s, const double *values,
+                                                  size_t count);
+enum fingertip_status fingertip_grip_take_answer(struct fingertip_grip *grip, const struct fingertip_grip_answer *answer);
 /* FINGERTIP_END: not from this state (CONTROL.md). */
 enum fingertip_status fingertip_grip_ask(struct fingertip_grip *grip, enum fingertip_grip_request request);
 /* Call it after every input, and every 10 ms without one. */
-enum fingertip_status fingertip_grip_step(struct fingertip_grip *grip, double now_s,
-                                          struct fingertip_grip_command *command, struct fingertip_grip_report *report);
+enum fingertip_status fingertip_grip_step(struct fingertip_grip *grip, double now_s, struct fingertip_grip_command *command,
+                                          struct fingertip_grip_report *report);
 
 /* "slipping"; "finger_0_stale at_cap" */
 size_t fingertip_grip_state_name(uint8_t state, char *text, size_t size);

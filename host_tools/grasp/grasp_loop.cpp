@@ -186,8 +186,7 @@ void GraspLoop::step() {
     news.report = core_->step(1e-6 * static_cast<double>(news.host_us), news.command);
   }
   /* Begun once it goes on, whatever the fingers touch on their way. */
-  is_activating_ = news.report.state == GRIP_ACTIVATING && options_.activate &&
-                   (is_activating_ || news.command.motion == GRIP_ACTIVATE);
+  is_activating_ = news.report.state == GRIP_ACTIVATING && options_.activate && (is_activating_ || news.command.motion == GRIP_ACTIVATE);
   if (is_activating_ || news.command.motion == GRIP_ACTIVATE) {
     news.command.motion = is_activating_ ? GRIP_ACTIVATE : GRIP_STAY;
   }

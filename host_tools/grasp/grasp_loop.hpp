@@ -14,9 +14,8 @@
 // each frame and answer, and every 5 ms without any. None waits for the reader of the news. News that are not read for
 // long are dropped and counted. All times are of the host's steady clock. The core has no other clock.
 //
-// A failure is a trouble in the report and never opens the gripper. The loop waits for a fingertip
-// or a gripper that is gone, and goes on when it is back. If this process dies, the gripper goes to
-// the last commanded width, some tenths of a millimetre away, and stays.
+// A failure is a trouble in the report and never opens the gripper. The loop waits for a fingertip or a gripper that is gone, and goes on
+// when it is back. If this process dies, the gripper goes to the last commanded width, some tenths of a millimetre away, and stays.
 #pragma once
 
 #include "grasp/control/grip.hpp"
@@ -84,8 +83,7 @@ public:
   // Their news of kind ready, once both have answered. Throws Error, and Interrupted once stop reports so.
   std::array<DeviceNews, FINGERS> meet(const std::function<bool()> &stop);
 
-  // Fingertips stream, the core steps; nothing moves before it is requested. Throws Error where the
-  // gripper does not answer.
+  // Fingertips stream, the core steps; nothing moves before it is requested. Throws Error where the gripper does not answer.
   void begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen, const GripSettings &settings);
   // False: not from this state.
   bool request(GripRequest wanted);

@@ -56,8 +56,7 @@ template <typename Field> Column flag(const char *name, Field field) {
 }
 
 template <typename Field, typename Parse>
-Column word(const char *name, Field field,
-            std::string (*text)(std::decay_t<decltype(field(std::declval<GripRow &>()))>), Parse parse) {
+Column word(const char *name, Field field, std::string (*text)(std::decay_t<decltype(field(std::declval<GripRow &>()))>), Parse parse) {
   return {name, false, [=](const GripRow &row) { return text(field(row)); },
           [=](std::string_view cell, GripRow &row) {
             const auto read = parse(cell);
@@ -66,7 +65,7 @@ Column word(const char *name, Field field,
           }};
 }
 
-#define FIELD(member)                                                                                                  \
+#define FIELD(member)                                                                                                                      \
   [](auto &row) -> auto & { return row.member; }
 
 const std::vector<Column> &columns() {
@@ -108,8 +107,7 @@ std::string grip_columns() {
 std::string grip_cells(const GripRow &row) {
   std::string text;
   for (const Column &column : columns()) {
-    text += (&column == &columns().front() ? "" : ",") +
-            (column.is_of_status && !row.status ? std::string() : column.write(row));
+    text += (&column == &columns().front() ? "" : ",") + (column.is_of_status && !row.status ? std::string() : column.write(row));
   }
   return text;
 }
@@ -117,8 +115,8 @@ std::string grip_cells(const GripRow &row) {
 GripRow grip_row(std::string_view value) {
   const auto cells = split(value, ',');
   if (cells.size() != columns().size() + 1) {
-    throw Error(ErrorCode::damaged_line, std::to_string(cells.size()) + " columns of the gripper instead of " +
-                                             std::to_string(columns().size() + 1));
+    throw Error(ErrorCode::damaged_line,
+                std::to_string(cells.size()) + " columns of the gripper instead of " + std::to_string(columns().size() + 1));
   }
   GripRow row;
   const auto time_us = to_double(cells[0]);

@@ -16,8 +16,8 @@ constexpr std::int64_t REOPEN_us = 200000;
 constexpr std::size_t MOST_NEWS = 2000;
 
 static bool is_same(const GripCommand &a, const GripCommand &b) {
-  return a.motion == b.motion && (a.motion != GRIP_MOVE ||
-                                  (a.width_mm == b.width_mm && a.speed_mm_s == b.speed_mm_s && a.force_N == b.force_N));
+  return a.motion == b.motion &&
+         (a.motion != GRIP_MOVE || (a.width_mm == b.width_mm && a.speed_mm_s == b.speed_mm_s && a.force_N == b.force_N));
 }
 
 static std::string trouble_of(const Gripper &gripper, const GripperStatus &status) {
@@ -29,8 +29,7 @@ static std::string trouble_of(const Gripper &gripper, const GripperStatus &statu
 
 GripperThread::GripperThread(std::unique_ptr<Gripper> gripper, OpenGripper reopen)
     : gripper_(std::move(gripper)), reopen_(std::move(reopen)),
-      poll_us_(std::max(SHORTEST_us, static_cast<std::int64_t>(1e6 * gripper_->traits().poll_s))),
-      thread_([this] { run(); }) {}
+      poll_us_(std::max(SHORTEST_us, static_cast<std::int64_t>(1e6 * gripper_->traits().poll_s))), thread_([this] { run(); }) {}
 
 GripperThread::~GripperThread() {
   {

@@ -1,7 +1,6 @@
-// A gripper in a thread of its own, so that a slow or silent line delays nothing else. The newest
-// command goes out with the next exchange, and every answer comes back. The thread repeats an
-// exchange that fails, with the newest command. It opens a port that vanished again. It activates
-// nothing without a command, and sends nothing that the core did not command.
+// A gripper in a thread of its own, so that a slow or silent line delays nothing else. The newest command goes out with the next exchange,
+// and every answer comes back. The thread repeats an exchange that fails, with the newest command. It opens a port that vanished again. It
+// activates nothing without a command, and sends nothing that the core did not command.
 #pragma once
 
 #include "grasp/control/grip.hpp"

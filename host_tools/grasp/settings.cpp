@@ -56,8 +56,7 @@ const std::vector<GraspSetting> &grasp_settings() {
 std::string field_name(const GraspSetting &setting) { return std::string(split(setting.path, '.').back()); }
 
 const GraspSetting &setting_of_field(const std::string &name) {
-  const auto *found =
-      find_in(grasp_settings(), [&](const GraspSetting &setting) { return field_name(setting) == name; });
+  const auto *found = find_in(grasp_settings(), [&](const GraspSetting &setting) { return field_name(setting) == name; });
   return found ? *found : throw Error(ErrorCode::bad_value, "no setting " + printable(name));
 }
 
@@ -110,9 +109,8 @@ GripSettings settings_for(const GripperTraits &traits, const std::map<std::strin
       continue;
     }
     if (!(value->second >= setting.low && value->second <= setting.high)) {
-      impossible("--" + std::string(setting.name) + " is not possible; give " +
-                 shortest(static_cast<float>(setting.low)) + " to " + shortest(static_cast<float>(setting.high)) +
-                 (*setting.unit ? " " : "") + setting.unit);
+      impossible("--" + std::string(setting.name) + " is not possible; give " + shortest(static_cast<float>(setting.low)) + " to " +
+                 shortest(static_cast<float>(setting.high)) + (*setting.unit ? " " : "") + setting.unit);
     }
     setting.field(settings) = value->second * setting.scale;
   }
@@ -125,19 +123,16 @@ GripSettings settings_for(const GripperTraits &traits, const std::map<std::strin
     }
   };
   const double cap_N = settings.cap_N;
-  follow("open-width", settings.release_width_mm, 0.0, traits.stroke_mm,
-         traits.model + " opens to " + fixed(traits.stroke_mm, 1) + " mm");
+  follow("open-width", settings.release_width_mm, 0.0, traits.stroke_mm, traits.model + " opens to " + fixed(traits.stroke_mm, 1) + " mm");
   follow(FIXED, settings.set_N, 0.0, cap_N, "it is above --cap");
   follow("start", settings.start_N, 0.0, cap_N, "it is above --cap");
   follow("floor", settings.floor_N, 0.0, cap_N, "it is above --cap");
   follow("blind", settings.blind_N, settings.start_N, cap_N, "it must lie between --start and --cap");
-  const double least_mm =
-      traits.step_mm * std::max(1.0, std::ceil(traits.deadband_mm / std::max(traits.step_mm, 1e-6) - 1e-9));
+  const double least_mm = traits.step_mm * std::max(1.0, std::ceil(traits.deadband_mm / std::max(traits.step_mm, 1e-6) - 1e-9));
   const double step_N = GripBound::first_N(least_mm);
   if (step_N > cap_N) {
-    impossible("the least move of a " + traits.model + ", " + fixed(least_mm, 2) + " mm, may press with " +
-               fixed(step_N, 1) + " N, and the cap is " + fixed(cap_N, 1) +
-               " N; take a gripper of finer steps, or a higher --cap");
+    impossible("the least move of a " + traits.model + ", " + fixed(least_mm, 2) + " mm, may press with " + fixed(step_N, 1) +
+               " N, and the cap is " + fixed(cap_N, 1) + " N; take a gripper of finer steps, or a higher --cap");
   }
   return settings;
 }

@@ -1,5 +1,4 @@
-// Every limit of the controller's settings as an option of a command line, with its unit and its
-// range, and presets of them.
+// Every limit of the controller's settings as an option of a command line, with its unit and its range, and presets of them.
 #pragma once
 
 #include "grasp/control/settings.hpp"
@@ -34,8 +33,7 @@ struct GraspPreset {
   double breaks_N;
 };
 const std::vector<GraspPreset> &grasp_presets();
-// The settings of a preset: cap, start and floor well below that force, and a slow approach. Throws Error, bad_value:
-// there is none.
+// The settings of a preset: cap, start and floor well below that force, and a slow approach. Throws Error, bad_value: there is none.
 std::map<std::string, double> preset_values(const std::string &preset);
 std::map<std::string, double> breaking_values(double breaks_N);
 

@@ -69,9 +69,7 @@ std::optional<std::uint8_t> state_of_name(std::string_view name) {
 
 std::string state_text(std::uint8_t state) { return state < GRIP_STATES ? STATES[state].text : std::to_string(state); }
 
-bool is_end_state(std::uint8_t state) {
-  return state == GRIP_OPEN || state == GRIP_DROPPED || state == GRIP_MISSED || state == GRIP_FAULT;
-}
+bool is_end_state(std::uint8_t state) { return state == GRIP_OPEN || state == GRIP_DROPPED || state == GRIP_MISSED || state == GRIP_FAULT; }
 
 const char *request_name(GripRequest request) { return REQUESTS[request]; }
 

@@ -21,14 +21,12 @@ constexpr Advice ADVICE[] = {
     {Code::no_port, "plug the fingertip in, then see `fingertip list`"},
     {Code::not_a_port, "a recording is shown with `fingertip replay`"},
     {Code::port_in_use, "end that one first (`fingertip doctor` names it)"},
-    {Code::permission_denied,
-     "install the udev rule: fingertip rule | sudo tee /etc/udev/rules.d/60-fingertip.rules, then sudo "
-     "udevadm control --reload, and plug it in again"},
+    {Code::permission_denied, "install the udev rule: fingertip rule | sudo tee /etc/udev/rules.d/60-fingertip.rules, then sudo "
+                              "udevadm control --reload, and plug it in again"},
     {Code::cannot_open, "check the path"},
     {Code::cannot_read, "check the path"},
-    {Code::no_fingertip,
-     "plug one in, name its port with --port PATH or in FINGERTIP_PORT, or simulate one with `fingertip "
-     "simulate`"},
+    {Code::no_fingertip, "plug one in, name its port with --port PATH or in FINGERTIP_PORT, or simulate one with `fingertip "
+                         "simulate`"},
     {Code::not_simulated, "start `fingertip simulate`, with --lift where two or a gripper are needed"},
     {Code::several_fingertips, "choose one with --device SERIAL"},
     {Code::several_in_file, "choose one with --device SERIAL"},
@@ -49,10 +47,8 @@ constexpr Advice ADVICE[] = {
     {Code::unknown_command, "see what it can do (fingertip info), or update it"},
     {Code::not_now, "see that its sensors answer and nothing is being stored (fingertip info)"},
     {Code::refused, "update these tools"},
-    {Code::gripper_silent,
-     "is it powered, its cable right, --model, --port and --slave its own? (fingertip gripper list)"},
-    {Code::gripper_garbled,
-     "look for a second program or device on its line, loose cables, a missing terminator, another --model"},
+    {Code::gripper_silent, "is it powered, its cable right, --model, --port and --slave its own? (fingertip gripper list)"},
+    {Code::gripper_garbled, "look for a second program or device on its line, loose cables, a missing terminator, another --model"},
     {Code::gripper_refused, "see that --model is its own, turn its power off and on"},
     {Code::cannot_write, "choose another place"},
     {Code::file_exists, "choose another name, or --overwrite"},
@@ -78,8 +74,7 @@ constexpr Advice GRIPPER_ADVICE[] = {
     {Code::port_in_use, "end that one first (lsof names it)"},
 };
 
-template <std::size_t count>
-std::string advice_in(const Advice (&all)[count], ErrorCode code, const std::string &otherwise) {
+template <std::size_t count> std::string advice_in(const Advice (&all)[count], ErrorCode code, const std::string &otherwise) {
   const Advice *found = find_in(all, [&](const Advice &each) { return each.code == code; });
   return found ? found->text : otherwise;
 }
@@ -95,8 +90,6 @@ std::string error_text(const Error &error) {
   return printable(error.what() + (what_to_do.empty() ? "" : "; " + what_to_do));
 }
 
-void print_error(const char *program, const Error &error) {
-  std::fprintf(stderr, "%s: %s\n", program, error_text(error).c_str());
-}
+void print_error(const char *program, const Error &error) { std::fprintf(stderr, "%s: %s\n", program, error_text(error).c_str()); }
 
 } // namespace fingertip

@@ -83,8 +83,7 @@ public:
     if (option->get_type_size() == 0) {
       return "";
     }
-    return " " + values_of(*option).word +
-           (option->get_expected_max() == CLI::detail::expected_max_vector_size ? " ..." : "");
+    return " " + values_of(*option).word + (option->get_expected_max() == CLI::detail::expected_max_vector_size ? " ..." : "");
   }
 
   std::string make_option_desc(const CLI::Option *option) const override {
@@ -149,8 +148,8 @@ std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
   for (const CLI::Option *option : options) {
     const Values values = values_of(*option);
     if (kind == "ValidationError" && !values.allowed.empty() && text.rfind(option->get_name() + ": ", 0) == 0) {
-      return option->get_name() + " takes " + values.allowed + (values.unit.empty() ? "" : " " + values.unit) +
-             ", not \"" + refused_value(text.substr(option->get_name().size() + 2)) + "\"";
+      return option->get_name() + " takes " + values.allowed + (values.unit.empty() ? "" : " " + values.unit) + ", not \"" +
+             refused_value(text.substr(option->get_name().size() + 2)) + "\"";
     }
     if (kind == "RequiredError" && option->get_required() && text.rfind(option->get_name(), 0) == 0) {
       return option->get_type_name() + " is missing";

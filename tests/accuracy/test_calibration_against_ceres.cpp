@@ -27,10 +27,10 @@ struct ReadingCost {
     for (const auto &[strength, ratio] : PULL) {
       pulled += strength * exp(-square / (2.0 * ratio * ratio * width * width));
     }
-    const T value = exp(sensor[0] + profile[0] + placement[2] - 2.0 * placement[3]) *
-                    ((1.0 - profile[2]) * wide + profile[2] * narrow -
-                     profile[5] * exp(-square / (2.0 * width * width * exp(2.0 * profile[6]))) +
-                     (profile[7] * u + profile[8] * v) / width * pulled);
+    const T value =
+        exp(sensor[0] + profile[0] + placement[2] - 2.0 * placement[3]) *
+        ((1.0 - profile[2]) * wide + profile[2] * narrow - profile[5] * exp(-square / (2.0 * width * width * exp(2.0 * profile[6]))) +
+         (profile[7] * u + profile[8] * v) / width * pulled);
     residual[0] = (reading_Pa - value - sensor[3] + sensor[5] * earlier_Pa) / sd_Pa;
     return true;
   }
@@ -46,10 +46,8 @@ template <int SIZE> struct Prior {
 };
 
 template <int SIZE>
-static void add_prior(ceres::Problem &problem, double *block, int at, double mean, double sd,
-                      ceres::LossFunction *loss = nullptr) {
-  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Prior<SIZE>, 1, SIZE>(new Prior<SIZE>{at, mean, sd}), loss,
-                           block);
+static void add_prior(ceres::Problem &problem, double *block, int at, double mean, double sd, ceres::LossFunction *loss = nullptr) {
+  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Prior<SIZE>, 1, SIZE>(new Prior<SIZE>{at, mean, sd}), loss, block);
 }
 
 struct Found {
@@ -58,8 +56,7 @@ struct Found {
 };
 
 // With the spreads that the solver has learnt.
-static Found by_ceres(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
-                      Random &start) {
+static Found by_ceres(const Array &array, const std::vector<Placement> &placements, const Solution &solution, Random &start) {
   const Assumptions assumed;
   double peak_Pa = 0.0, near_Pa = 0.0;
   {
@@ -76,27 +73,20 @@ static Found by_ceres(const Array &array, const std::vector<Placement> &placemen
     sensor.fill(0.0);
     sensor[0] = 0.05 * start.normal();
   }
-  std::array<double, PROFILE_UNKNOWNS> profile{std::log(1.1 * peak_Pa), std::log(5.0), 0.1, 0.0, 0.0, 0.0,
-                                               std::log(DIP_WIDTHS),    0.0,           0.0};
+  std::array<double, PROFILE_UNKNOWNS> profile{std::log(1.1 * peak_Pa), std::log(5.0), 0.1, 0.0, 0.0, 0.0, std::log(DIP_WIDTHS), 0.0, 0.0};
   std::vector<std::array<double, 6>> own(placements.size());
   ceres::Problem problem;
   ceres::LossFunction *huber = new ceres::HuberLoss(HUBER);
   for (std::size_t i = 0; i < placements.size(); i++) {
-    own[i] = {solution.placements[i].x_mm + 0.5 * start.normal(),
-              solution.placements[i].y_mm + 0.5 * start.normal(),
-              0.0,
-              0.0,
-              0.0,
-              0.0};
+    own[i] = {solution.placements[i].x_mm + 0.5 * start.normal(), solution.placements[i].y_mm + 0.5 * start.normal(), 0.0, 0.0, 0.0, 0.0};
     for (std::size_t k = 0; k < SENSORS; k++) {
       const double reading = placements[i].reading_Pa[k];
       const double model = assumed.model_share * peak_Pa, share = assumed.reading_share * reading;
-      const double sd = std::sqrt(placements[i].noise_Pa * placements[i].noise_Pa +
-                                  solution.excess * solution.excess * (model * model + share * share));
-      problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<ReadingCost, 1, SENSOR_UNKNOWNS, PROFILE_UNKNOWNS, 6>(
-              new ReadingCost{array.x_mm[k], array.y_mm[k], reading, sd, placements[i].earlier_Pa[k]}),
-          huber, sensors[k].data(), profile.data(), own[i].data());
+      const double sd =
+          std::sqrt(placements[i].noise_Pa * placements[i].noise_Pa + solution.excess * solution.excess * (model * model + share * share));
+      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<ReadingCost, 1, SENSOR_UNKNOWNS, PROFILE_UNKNOWNS, 6>(
+                                   new ReadingCost{array.x_mm[k], array.y_mm[k], reading, sd, placements[i].earlier_Pa[k]}),
+                               huber, sensors[k].data(), profile.data(), own[i].data());
     }
     add_prior<6>(problem, own[i].data(), 2, 0.0, solution.spread.force, huber);
     add_prior<6>(problem, own[i].data(), 3, 0.0, solution.spread.width, huber);

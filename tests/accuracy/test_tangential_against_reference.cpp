@@ -1,7 +1,6 @@
-// The on-chip tangential estimate against the optimum of its own definition in double precision
-// (reference/tangential.hpp), on presses of a layer of 12 mm with noise, gain errors and pulls of
-// up to 0.3 of the force that the array can resolve: optimiser against optimiser.
-// C's function and struct of one name are a shadow to C++.
+// The on-chip tangential estimate against the optimum of its own definition in double precision (reference/tangential.hpp), on presses of a
+// layer of 12 mm with noise, gain errors and pulls of up to 0.3 of the force that the array can resolve: optimiser against optimiser. C's
+// function and struct of one name are a shadow to C++.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wshadow"
 extern "C" {
@@ -44,9 +43,7 @@ int main(int argc, char **argv) {
     return 1;
   }
   std::mt19937_64 random(20240611);
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random);
-  };
+  const auto uniform = [&](double low, double high) { return std::uniform_real_distribution<double>(low, high)(random); };
   const auto all = (std::uint32_t{1} << geometry.sensor_count) - 1;
   std::vector<double> um, force, pull;
   int invalid = 0, not_observable = 0;
@@ -61,8 +58,8 @@ int main(int argc, char **argv) {
     std::vector<std::int32_t> readings;
     std::vector<reference::TangentialSample> samples;
     for (std::size_t k = 0; k < geometry.sensor_count; k++) {
-      reference::TangentialSample sample{static_cast<double>(geometry.x_mm[k]), static_cast<double>(geometry.y_mm[k]),
-                                         0.0, settings.gain_sd_q16[k] / 65536.0};
+      reference::TangentialSample sample{static_cast<double>(geometry.x_mm[k]), static_cast<double>(geometry.y_mm[k]), 0.0,
+                                         settings.gain_sd_q16[k] / 65536.0};
       const double dx = sample.x_mm - x, dy = sample.y_mm - y, r2 = dx * dx + dy * dy;
       double Pa = 0.0;
       for (const auto &term : profile.normal) {
@@ -71,8 +68,8 @@ int main(int argc, char **argv) {
       }
       for (const auto &term : profile.tangential) {
         const double v = std::pow(static_cast<double>(term.sd_mm), 2) + 1.3 * spread;
-        Pa += N * ratio * (std::cos(angle) * dx + std::sin(angle) * dy) * static_cast<double>(term.moment_mm) /
-              (v * v) * std::exp(-r2 / (2 * v));
+        Pa += N * ratio * (std::cos(angle) * dx + std::sin(angle) * dy) * static_cast<double>(term.moment_mm) / (v * v) *
+              std::exp(-r2 / (2 * v));
       }
       Pa *= 1e6 / (2 * M_PI) * (1 + gain_sd * std::normal_distribution<double>()(random));
       Pa += std::normal_distribution<double>(0, noise_Pa)(random);
@@ -99,27 +96,20 @@ int main(int argc, char **argv) {
       invalid++;
       continue;
     }
-    um.push_back(1e3 *
-                 std::hypot(static_cast<double>(found.x_mm) - best.x_mm, static_cast<double>(found.y_mm) - best.y_mm));
+    um.push_back(1e3 * std::hypot(static_cast<double>(found.x_mm) - best.x_mm, static_cast<double>(found.y_mm) - best.y_mm));
     force.push_back(std::abs(static_cast<double>(found.force_N) / best.force_N - 1));
-    pull.push_back(
-        std::hypot(static_cast<double>(found.qx_N) - best.qx_N, static_cast<double>(found.qy_N) - best.qy_N) /
-        best.force_N);
+    pull.push_back(std::hypot(static_cast<double>(found.qx_N) - best.qx_N, static_cast<double>(found.qy_N) - best.qy_N) / best.force_N);
   }
   const auto elsewhere = std::count_if(um.begin(), um.end(), [](double value) { return value > 100; });
-  std::printf("%zu presses, %d not observable, %d not valid, %d more than 100 um away\n", um.size(), not_observable,
-              invalid, static_cast<int>(elsewhere));
-  std::printf("um p50 %.3f p90 %.3f p99 %.3f max %.1f\n", quantile(um, 0.5), quantile(um, 0.9), quantile(um, 0.99),
-              quantile(um, 1.0));
-  std::printf("pull over force p50 %.6f p99 %.6f, force p99 %.6f\n", quantile(pull, 0.5), quantile(pull, 0.99),
-              quantile(force, 0.99));
+  std::printf("%zu presses, %d not observable, %d not valid, %d more than 100 um away\n", um.size(), not_observable, invalid,
+              static_cast<int>(elsewhere));
+  std::printf("um p50 %.3f p90 %.3f p99 %.3f max %.1f\n", quantile(um, 0.5), quantile(um, 0.9), quantile(um, 0.99), quantile(um, 1.0));
+  std::printf("pull over force p50 %.6f p99 %.6f, force p99 %.6f\n", quantile(pull, 0.5), quantile(pull, 0.99), quantile(force, 0.99));
   if (argc > 1) { // for the report
-    std::ofstream(argv[1]) << "{\"optimum_p99_um\": " << quantile(um, 0.99)
-                           << ", \"optimum_p99_ratio\": " << quantile(pull, 0.99) << "}\n";
+    std::ofstream(argv[1]) << "{\"optimum_p99_um\": " << quantile(um, 0.99) << ", \"optimum_p99_ratio\": " << quantile(pull, 0.99) << "}\n";
   }
-  const bool good = um.size() > PRESSES / 2 && invalid < PRESSES / 100 && elsewhere <= MOST_ELSEWHERE &&
-                    quantile(um, 0.5) < MEDIAN_um && quantile(um, 0.99) < P99_um && quantile(pull, 0.99) < PULL_P99 &&
-                    quantile(force, 0.99) < FORCE_P99;
+  const bool good = um.size() > PRESSES / 2 && invalid < PRESSES / 100 && elsewhere <= MOST_ELSEWHERE && quantile(um, 0.5) < MEDIAN_um &&
+                    quantile(um, 0.99) < P99_um && quantile(pull, 0.99) < PULL_P99 && quantile(force, 0.99) < FORCE_P99;
   std::puts(good ? "pass" : "FAIL");
   return good ? 0 : 1;
 }

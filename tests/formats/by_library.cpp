@@ -1,5 +1,4 @@
-// What libfingertip makes of each input of the corpus: usage by_library JOBS.json > answers.json. corpus.py says what a
-// job is.
+// What libfingertip makes of each input of the corpus: usage by_library JOBS.json > answers.json. corpus.py says what a job is.
 #include "libfingertip/command.hpp"
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/error.hpp"
@@ -105,21 +104,14 @@ static json setting_json(const std::string &text) {
 static const char *kind_of(ErrorCode code) {
   switch (code) {
   case ErrorCode::not_a_recording:
-  case ErrorCode::unread_kind:
-    return "no recording";
-  case ErrorCode::other_format:
-    return "other format";
+  case ErrorCode::unread_kind: return "no recording";
+  case ErrorCode::other_format: return "other format";
   case ErrorCode::damaged_head:
-  case ErrorCode::damaged_line:
-    return "damaged";
-  case ErrorCode::several_in_file:
-    return "several";
-  case ErrorCode::no_such_in_file:
-    return "no such";
-  case ErrorCode::bad_value:
-    return "bad value";
-  default:
-    return "other";
+  case ErrorCode::damaged_line: return "damaged";
+  case ErrorCode::several_in_file: return "several";
+  case ErrorCode::no_such_in_file: return "no such";
+  case ErrorCode::bad_value: return "bad value";
+  default: return "other";
   }
 }
 

@@ -14,8 +14,8 @@ static inline void fuzz_put_record(struct fuzz_input *input, uint32_t generation
   const unsigned slot = fuzz_u8(input) % STORE_SLOTS;
   const uint8_t how = fuzz_u8(input);
   const uint16_t version = how & 1 ? 2 : how & 2 ? 1 : fuzz_u8(input);
-  const unsigned usual = 4 + 14 + 8u * sensor_count + 24 + (version >= 2 ? 4 * PAD_PROFILE_FLOATS + 1 : 0) +
-                         (version >= 3 ? 9 : 0) + (version >= 4 ? 6u * sensor_count : 0);
+  const unsigned usual = 4 + 14 + 8u * sensor_count + 24 + (version >= 2 ? 4 * PAD_PROFILE_FLOATS + 1 : 0) + (version >= 3 ? 9 : 0) +
+                         (version >= 4 ? 6u * sensor_count : 0);
   const size_t slot_bytes = usual > STORE_SHORT_SLOT_BYTES - 28 ? STORE_LONG_SLOT_BYTES : STORE_SHORT_SLOT_BYTES;
   uint8_t *at = native_flash.bytes + sector * PORT_FLASH_SECTOR_BYTES + slot * slot_bytes % PORT_FLASH_SECTOR_BYTES;
   size_t length = how & 4 ? fuzz_u16(input) % (slot_bytes - 28) : usual;

@@ -1,6 +1,5 @@
-/* What every fuzz target is made of: one function that takes bytes, a reader for them, and a check that stops the
- * program. Bytes and runs are counted by fuzz.c in the file that the environment's FINGERTIP_FUZZ_COUNT names, also
- * where a run ends the program. */
+/* What every fuzz target is made of: one function that takes bytes, a reader for them, and a check that stops the program. Bytes and runs
+ * are counted by fuzz.c in the file that the environment's FINGERTIP_FUZZ_COUNT names, also where a run ends the program. */
 #pragma once
 
 #include <stdbool.h>
@@ -21,12 +20,12 @@ void fuzz_one(const uint8_t *bytes, size_t length);
 }
 #endif
 
-#define FUZZ_CHECK(condition)                                                                                          \
-  do {                                                                                                                 \
-    if (!(condition)) {                                                                                                \
-      fprintf(stderr, "%s:%d: does not hold: %s\n", __FILE__, __LINE__, #condition);                                   \
-      abort();                                                                                                         \
-    }                                                                                                                  \
+#define FUZZ_CHECK(condition)                                                                                                              \
+  do {                                                                                                                                     \
+    if (!(condition)) {                                                                                                                    \
+      fprintf(stderr, "%s:%d: does not hold: %s\n", __FILE__, __LINE__, #condition);                                                       \
+      abort();                                                                                                                             \
+    }                                                                                                                                      \
   } while (0)
 
 /* Takes an input apart from its front; behind its end there are zeros. */

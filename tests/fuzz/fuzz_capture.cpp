@@ -8,8 +8,7 @@ using namespace fingertip;
 // Without what a recording has elsewhere, or not at all: commands, raw packets of another number of
 // sensors, and how the firmware last ended, which only who asks is told.
 static bool is_recorded(const wire_packet &packet, std::uint8_t sensors) {
-  return packet.type < WIRE_CMD_STREAM && packet.type != WIRE_CRASH &&
-         (packet.type != WIRE_RAW || packet.body.raw.sensor_count == sensors);
+  return packet.type < WIRE_CMD_STREAM && packet.type != WIRE_CRASH && (packet.type != WIRE_RAW || packet.body.raw.sensor_count == sensors);
 }
 
 static void check_recording_of(const std::vector<fuzz::Item> &items, bool raw_expected) {

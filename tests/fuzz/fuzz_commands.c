@@ -49,11 +49,9 @@ static void check_info(const struct wire_info *info) {
   FUZZ_CHECK(info->sensor_count == geometry.sensor_count);
   FUZZ_CHECK(info->rate_mHz == 0 || (info->rate_mHz >= WIRE_RATE_MIN_mHz && info->rate_mHz <= WIRE_RATE_MAX_mHz));
   FUZZ_CHECK(info->osr >= 256 && info->osr <= 8192 && (info->osr & (info->osr - 1)) == 0);
-  FUZZ_CHECK(info->slip_threshold_mm >= WIRE_SLIP_THRESHOLD_MIN_mm &&
-             info->slip_threshold_mm <= WIRE_SLIP_THRESHOLD_MAX_mm);
+  FUZZ_CHECK(info->slip_threshold_mm >= WIRE_SLIP_THRESHOLD_MIN_mm && info->slip_threshold_mm <= WIRE_SLIP_THRESHOLD_MAX_mm);
   FUZZ_CHECK(info->slip_window_ms >= WIRE_SLIP_WINDOW_MIN_ms && info->slip_window_ms <= WIRE_SLIP_WINDOW_MAX_ms);
-  FUZZ_CHECK(info->location_limit_mm >= WIRE_LOCATION_LIMIT_MIN_mm &&
-             info->location_limit_mm <= WIRE_LOCATION_LIMIT_MAX_mm);
+  FUZZ_CHECK(info->location_limit_mm >= WIRE_LOCATION_LIMIT_MIN_mm && info->location_limit_mm <= WIRE_LOCATION_LIMIT_MAX_mm);
   FUZZ_CHECK(info->prior_width_mm == 0.0f ||
              (info->prior_sigma_mm >= WIRE_PRIOR_SIGMA_MIN_mm && info->prior_sigma_mm <= WIRE_PRIOR_SIGMA_MAX_mm));
   FUZZ_CHECK((info->streams & ~WIRE_STREAM_ALL) == 0);
@@ -149,12 +147,10 @@ static void send_raw(struct fuzz_input *input) {
 }
 
 static void send_command(struct fuzz_input *input) {
-  static const uint8_t body_bytes[] = {1, 1, 4, 2, 6, 0, 0, 4, 15 + 8 * 15, 0, 1, 8, 4, 4 * PAD_PROFILE_FLOATS + 1,
-                                       0, 3};
+  static const uint8_t body_bytes[] = {1, 1, 4, 2, 6, 0, 0, 4, 15 + 8 * 15, 0, 1, 8, 4, 4 * PAD_PROFILE_FLOATS + 1, 0, 3};
   const uint8_t type = fuzz_u8(input);
   const bool is_sync = (type & 0x0F) == (WIRE_CMD_SYNC & 0x0F) && type & 0x40;
-  uint8_t packet[WIRE_HEADER_BYTES + 256] = {WIRE_VERSION,
-                                             is_sync ? (uint8_t)WIRE_CMD_SYNC : (uint8_t)(0x80 | (type & 0x0F))};
+  uint8_t packet[WIRE_HEADER_BYTES + 256] = {WIRE_VERSION, is_sync ? (uint8_t)WIRE_CMD_SYNC : (uint8_t)(0x80 | (type & 0x0F))};
   size_t length = type & 0x10 ? fuzz_u8(input) : body_bytes[type & 0x0F];
   if (type & 0x20) { /* some other version or type */
     packet[0] = fuzz_u8(input);
@@ -176,30 +172,21 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
   power_up();
   while (fuzz_left(&input) > 0) {
     switch (fuzz_u8(&input) % OPERATIONS) {
-    case RAW:
-      send_raw(&input);
-      break;
-    case WAIT:
-      run_ms(fuzz_u8(&input));
-      break;
+    case RAW: send_raw(&input); break;
+    case WAIT: run_ms(fuzz_u8(&input)); break;
     case PORT:
       native_cdc_close();
       run_ms(1);
       native_cdc_open();
       break;
-    case STALL:
-      native_cdc_stall(fuzz_u8(&input) & 1);
-      break;
-    case POWER:
-      power_up();
-      break;
+    case STALL: native_cdc_stall(fuzz_u8(&input) & 1); break;
+    case POWER: power_up(); break;
     case STORED:
       native_flash_power_up();
       fuzz_put_record(&input, 1, geometry.sensor_count);
       power_up();
       break;
-    default:
-      send_command(&input);
+    default: send_command(&input);
     }
     listen();
   }

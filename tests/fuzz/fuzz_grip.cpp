@@ -51,8 +51,8 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
     GripCommand command;
     const GripReport report = grip.step(now_s, command);
     FUZZ_CHECK(report.state < GRIP_STATES);
-    for (const double value : {command.width_mm, command.speed_mm_s, command.force_N, report.wanted_N, report.load_N,
-                               report.margin, report.friction}) {
+    for (const double value :
+         {command.width_mm, command.speed_mm_s, command.force_N, report.wanted_N, report.load_N, report.margin, report.friction}) {
       FUZZ_CHECK(std::isfinite(value));
     }
     FUZZ_CHECK(command.width_mm >= 0.0 && command.width_mm <= traits.stroke_mm + 1e-9);

@@ -102,8 +102,7 @@ private:
     }
     const bool reads = asked->code == feetech::READ && asked->parameters.size() == 2;
     Bytes values = reads ? some(asked->parameters[1]) : Bytes();
-    if (reads && asked->parameters[0] <= feetech::OPERATING_MODE &&
-        asked->parameters[0] + asked->parameters[1] > feetech::OPERATING_MODE) {
+    if (reads && asked->parameters[0] <= feetech::OPERATING_MODE && asked->parameters[0] + asked->parameters[1] > feetech::OPERATING_MODE) {
       values[feetech::OPERATING_MODE - asked->parameters[0]] &= 1; // else it goes no further
     }
     return feetech::encoded({asked->id, fuzz_u8(&answers_), values});

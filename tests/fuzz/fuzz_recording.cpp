@@ -48,8 +48,8 @@ static std::vector<std::string> lines_of(const std::string &path, bool salvage) 
 
 // The sink writes a file of its own name: a folder of this process, in memory where there is one.
 static std::string written(const std::vector<std::string> &lines) {
-  static const std::string path = (std::filesystem::exists("/dev/shm") ? "/dev/shm/" : "/tmp/") +
-                                  std::string("fuzz_mcap_") + std::to_string(getpid()) + ".mcap";
+  static const std::string path =
+      (std::filesystem::exists("/dev/shm") ? "/dev/shm/" : "/tmp/") + std::string("fuzz_mcap_") + std::to_string(getpid()) + ".mcap";
   const auto sink = make_lines(path, true, OutputFile::Appears::at_once);
   for (const std::string &line : lines) {
     sink->line(line);

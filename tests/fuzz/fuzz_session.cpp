@@ -83,14 +83,9 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
         FUZZ_CHECK(packet.body.info.sensor_count >= 1 && packet.body.info.sensor_count <= FT_MAX_SENSORS);
         break;
       }
-      case 1:
-        FUZZ_CHECK(session.health().type == WIRE_HEALTH);
-        break;
-      case 2:
-        session.command(command_tare(), patient);
-        break;
-      default:
-        session.poll(std::chrono::milliseconds(1));
+      case 1: FUZZ_CHECK(session.health().type == WIRE_HEALTH); break;
+      case 2: session.command(command_tare(), patient); break;
+      default: session.poll(std::chrono::milliseconds(1));
       }
     } catch (const Gone &) {
     } catch (const Error &error) {

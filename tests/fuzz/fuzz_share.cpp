@@ -48,9 +48,7 @@ private:
       }
       break;
     case 2:
-    case 3:
-      command();
-      break;
+    case 3: command(); break;
     case 4: {
       Bytes line;
       fuzz::append_part(line, input_);
@@ -58,19 +56,14 @@ private:
       hub_.from_line(line.data(), line.size());
       break;
     }
-    case 5:
-      now_ += std::chrono::milliseconds(fuzz_u16(&input_));
-      break;
+    case 5: now_ += std::chrono::milliseconds(fuzz_u16(&input_)); break;
     case 6:
       if (some()) {
         take(client_, fuzz_u16(&input_));
       }
       break;
-    case 7:
-      stream();
-      break;
-    default:
-      answer();
+    case 7: stream(); break;
+    default: answer();
     }
   }
 

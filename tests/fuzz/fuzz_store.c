@@ -9,10 +9,9 @@ static uint8_t sensors; /* 3, or 20: they have long slots */
 static uint64_t now_us;
 
 static bool is_same(const struct store_content *a, const struct store_content *b) {
-  return a->has_calibration == b->has_calibration && a->has_settings == b->has_settings &&
-         a->has_profile == b->has_profile && memcmp(&a->calibration, &b->calibration, sizeof a->calibration) == 0 &&
-         memcmp(&a->settings, &b->settings, sizeof a->settings) == 0 &&
-         memcmp(&a->profile, &b->profile, PROFILE_BYTES) == 0;
+  return a->has_calibration == b->has_calibration && a->has_settings == b->has_settings && a->has_profile == b->has_profile &&
+         memcmp(&a->calibration, &b->calibration, sizeof a->calibration) == 0 &&
+         memcmp(&a->settings, &b->settings, sizeof a->settings) == 0 && memcmp(&a->profile, &b->profile, PROFILE_BYTES) == 0;
 }
 
 /* What is not there is zero, what is there is valid. */
@@ -150,8 +149,7 @@ void fuzz_one(const uint8_t *bytes, size_t length) {
       finish();
       start();
       break;
-    default:
-      change(&input, ours);
+    default: change(&input, ours);
     }
     check_content();
   }

@@ -1,5 +1,4 @@
-// Faults, one after another or several at a time, on the whole firmware while it is used: what must hold of its packets
-// (storm/judge.hpp).
+// Faults, one after another or several at a time, on the whole firmware while it is used: what must hold of its packets (storm/judge.hpp).
 #include "fuzz.h"
 #include "storm/storm.hpp"
 
@@ -11,8 +10,7 @@ constexpr double STEADY_SDS = 6;
 
 static void check(const Judge &judge) {
   for (const Finding &finding : judge.findings()) {
-    std::fprintf(stderr, "%s at %.3f s: %s\n", finding.kind.c_str(), 1e-6 * static_cast<double>(finding.t_us),
-                 finding.text.c_str());
+    std::fprintf(stderr, "%s at %.3f s: %s\n", finding.kind.c_str(), 1e-6 * static_cast<double>(finding.t_us), finding.text.c_str());
   }
   FUZZ_CHECK(judge.findings().empty());
 }

@@ -34,9 +34,7 @@ static Bytes file_of(const Bytes &flash) {
   const std::uint32_t crc = crc32_iso_hdlc(flash.data(), flash.size());
   for (std::size_t i = 0; i < count; i++) {
     std::uint8_t *block = &file[i * BLOCK_BYTES];
-    const auto put = [block](std::size_t word, std::size_t value) {
-      bytes_put_u32(block + 4 * word, static_cast<std::uint32_t>(value));
-    };
+    const auto put = [block](std::size_t word, std::size_t value) { bytes_put_u32(block + 4 * word, static_cast<std::uint32_t>(value)); };
     put(0, 0x0A324655);
     put(1, 0x9E5D5157);
     put(2, 0x2000);

@@ -1,6 +1,5 @@
-/* The USB device before a host that keeps no rule: any sequence of transactions on its control and bulk endpoints,
- * resets and suspensions, while its main loop reads and writes. A breach of the controller's contract stops it
- * (fake_controller.h). */
+/* The USB device before a host that keeps no rule: any sequence of transactions on its control and bulk endpoints, resets and suspensions,
+ * while its main loop reads and writes. A breach of the controller's contract stops it (fake_controller.h). */
 #include "fuzz.h"
 #include "unit/usb/enumerate.h"
 #include "unit/usb/fake_controller.h"
@@ -61,8 +60,7 @@ static enum ft_status device_writes(size_t length) {
   }
   bool open = cdc_is_open();
   enum ft_status status = cdc_write(bytes, length);
-  FUZZ_CHECK(status == FT_OK || (status == FT_ERR_SPACE && open) ||
-             (status == FT_ERR_ARGUMENT && length > TRANSMIT_BYTES));
+  FUZZ_CHECK(status == FT_OK || (status == FT_ERR_SPACE && open) || (status == FT_ERR_ARGUMENT && length > TRANSMIT_BYTES));
   if (status == FT_OK && open) {
     put(&to_host, bytes, length);
     ever_written += (uint32_t)length;
@@ -213,36 +211,18 @@ static uint8_t some_endpoint(struct fuzz_input *input) {
 
 static void step(struct fuzz_input *input) {
   switch (fuzz_u8(input) % 14) {
-  case 0:
-    transfer(input, false);
-    break;
+  case 0: transfer(input, false); break;
   case 1:
-  case 2:
-    transfer(input, true);
-    break;
+  case 2: transfer(input, true); break;
   case 3:
-  case 4:
-    host_reads(some_endpoint(input) | 0x80);
-    break;
+  case 4: host_reads(some_endpoint(input) | 0x80); break;
   case 5:
-  case 6:
-    host_writes(some_endpoint(input) & 0x7F, fuzz_u8(input) % 65);
-    break;
-  case 7:
-    device_writes(fuzz_u16(input) % (TRANSMIT_BYTES + 2));
-    break;
-  case 8:
-    device_reads(fuzz_u8(input));
-    break;
-  case 9:
-    host_bus_reset();
-    break;
-  case 10:
-    host_suspend();
-    break;
-  case 11:
-    host_resume();
-    break;
+  case 6: host_writes(some_endpoint(input) & 0x7F, fuzz_u8(input) % 65); break;
+  case 7: device_writes(fuzz_u16(input) % (TRANSMIT_BYTES + 2)); break;
+  case 8: device_reads(fuzz_u8(input)); break;
+  case 9: host_bus_reset(); break;
+  case 10: host_suspend(); break;
+  case 11: host_resume(); break;
   case 12:
     if (fuzz_u8(input) & 1) {
       fake_hold_interrupts();
@@ -250,8 +230,7 @@ static void step(struct fuzz_input *input) {
       fake_run_interrupts();
     }
     break;
-  default:
-    bring_up();
+  default: bring_up();
   }
   follow_closings();
 }

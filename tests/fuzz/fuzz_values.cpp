@@ -71,8 +71,7 @@ static void check_settings(fuzz_input &input) {
     const GripSettings settings = settings_for(traits, wanted);
     for (const GraspSetting &setting : all) {
       const auto asked = wanted.find(setting.name);
-      FUZZ_CHECK(asked == wanted.end() ||
-                 std::abs(value_of(setting, settings) - asked->second) <= 1e-9 * (1.0 + std::abs(asked->second)));
+      FUZZ_CHECK(asked == wanted.end() || std::abs(value_of(setting, settings) - asked->second) <= 1e-9 * (1.0 + std::abs(asked->second)));
     }
     settings_metadata(settings);
   } catch (const Error &error) {

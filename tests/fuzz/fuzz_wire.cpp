@@ -18,8 +18,7 @@ static Heard decoded(const Bytes &line, const std::vector<std::size_t> &pieces) 
   Heard heard;
   for (std::size_t at = 0, i = 0; at < line.size(); i++) {
     const std::size_t length = std::min(pieces[i % pieces.size()], line.size() - at);
-    decoder.feed(line.data() + at, length,
-                 [&](const wire_packet &packet) { heard.packets.push_back(fuzz::encoded(packet)); });
+    decoder.feed(line.data() + at, length, [&](const wire_packet &packet) { heard.packets.push_back(fuzz::encoded(packet)); });
     at += length;
   }
   heard.statistics = decoder.statistics();

@@ -33,8 +33,7 @@ inline std::vector<Item> rest_of(PacketFile &file) {
 }
 
 // Throws Error where the file does.
-inline std::vector<Item> read_twice(const std::string &path, bool salvage, const std::string &device,
-                                    std::size_t back_to) {
+inline std::vector<Item> read_twice(const std::string &path, bool salvage, const std::string &device, std::size_t back_to) {
   PacketFile file(path, salvage, device);
   std::vector<Item> items;
   while (items.size() < back_to) {

@@ -102,8 +102,7 @@ void explore_end(void) {
   explorer->active = false;
 }
 
-unsigned long explore(void (*run)(void), const struct explore_interrupt *interrupts, unsigned count, unsigned most,
-                      unsigned long *points) {
+unsigned long explore(void (*run)(void), const struct explore_interrupt *interrupts, unsigned count, unsigned most, unsigned long *points) {
   char here;
   size_t size = (size_t)(_end - __data_start);
   char *before = malloc(size);
@@ -170,13 +169,13 @@ void __tsan_write_range(void *address, size_t size) {
 }
 void __tsan_atomic_signal_fence(int order) { (void)order; }
 
-#define ACCESS(name)                                                                                                   \
-  void name(void *address);                                                                                            \
+#define ACCESS(name)                                                                                                                       \
+  void name(void *address);                                                                                                                \
   void name(void *address) { point(address); }
-#define ACCESSES(bytes)                                                                                                \
-  ACCESS(__tsan_read##bytes)                                                                                           \
-  ACCESS(__tsan_write##bytes)                                                                                          \
-  ACCESS(__tsan_unaligned_read##bytes)                                                                                 \
+#define ACCESSES(bytes)                                                                                                                    \
+  ACCESS(__tsan_read##bytes)                                                                                                               \
+  ACCESS(__tsan_write##bytes)                                                                                                              \
+  ACCESS(__tsan_unaligned_read##bytes)                                                                                                     \
   ACCESS(__tsan_unaligned_write##bytes)
 ACCESSES(1)
 ACCESSES(2)
@@ -184,18 +183,18 @@ ACCESSES(4)
 ACCESSES(8)
 ACCESSES(16)
 
-#define ATOMICS(bits)                                                                                                  \
-  uint##bits##_t __tsan_atomic##bits##_load(const volatile uint##bits##_t *address, int order);                        \
-  uint##bits##_t __tsan_atomic##bits##_load(const volatile uint##bits##_t *address, int order) {                       \
-    (void)order;                                                                                                       \
-    point((const void *)address);                                                                                      \
-    return *address;                                                                                                   \
-  }                                                                                                                    \
-  void __tsan_atomic##bits##_store(volatile uint##bits##_t *address, uint##bits##_t value, int order);                 \
-  void __tsan_atomic##bits##_store(volatile uint##bits##_t *address, uint##bits##_t value, int order) {                \
-    (void)order;                                                                                                       \
-    point((const void *)address);                                                                                      \
-    *address = value;                                                                                                  \
+#define ATOMICS(bits)                                                                                                                      \
+  uint##bits##_t __tsan_atomic##bits##_load(const volatile uint##bits##_t *address, int order);                                            \
+  uint##bits##_t __tsan_atomic##bits##_load(const volatile uint##bits##_t *address, int order) {                                           \
+    (void)order;                                                                                                                           \
+    point((const void *)address);                                                                                                          \
+    return *address;                                                                                                                       \
+  }                                                                                                                                        \
+  void __tsan_atomic##bits##_store(volatile uint##bits##_t *address, uint##bits##_t value, int order);                                     \
+  void __tsan_atomic##bits##_store(volatile uint##bits##_t *address, uint##bits##_t value, int order) {                                    \
+    (void)order;                                                                                                                           \
+    point((const void *)address);                                                                                                          \
+    *address = value;                                                                                                                      \
   }
 ATOMICS(32)
 ATOMICS(64)

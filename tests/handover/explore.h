@@ -21,8 +21,7 @@ struct explore_interrupt {
 
 /* Calls run() for every choice: some `most` interrupts in one run at most. What is static is put
  * back before each. Returns the number of runs; *points: of all of them. */
-unsigned long explore(void (*run)(void), const struct explore_interrupt *interrupts, unsigned count, unsigned most,
-                      unsigned long *points);
+unsigned long explore(void (*run)(void), const struct explore_interrupt *interrupts, unsigned count, unsigned most, unsigned long *points);
 
 /* Within run(): points count from here on, and no more. */
 void explore_begin(void);

@@ -16,8 +16,7 @@ enum {
   FIRST_FRAME = 2 /* the first conversion is of the temperature, and no frame */
 };
 
-/* Sensors that are ready at once, all of the same PROM; the codes of a conversion are the same, and
- * other than those of the one before. */
+/* Sensors that are ready at once, all of the same PROM; the codes of a conversion are the same, and other than those of the one before. */
 static struct {
   uint8_t command;
   uint32_t conversions;
@@ -110,8 +109,7 @@ static void finish_before_temperature(void) {
 }
 
 static void judge_frame(void) {
-  TEST_ASSERT_TRUE_MESSAGE(taken == 0 || (int32_t)(frame.number - last_number) > 0,
-                           "frames out of order, or one twice");
+  TEST_ASSERT_TRUE_MESSAGE(taken == 0 || (int32_t)(frame.number - last_number) > 0, "frames out of order, or one twice");
   TEST_ASSERT_TRUE_MESSAGE(taken == 0 || frame.t_us > last_t_us, "a frame from before");
   last_number = frame.number;
   last_t_us = frame.t_us;
@@ -121,8 +119,7 @@ static void judge_frame(void) {
   }
   TEST_ASSERT_EQUAL_MESSAGE(frame.pressure_Pa_q10[0], frame.pressure_Pa_q10[1], "a torn frame");
   TEST_ASSERT_EQUAL(3, frame.valid);
-  TEST_ASSERT_EQUAL_MESSAGE(sensors.begun_us[frame.number + FIRST_FRAME], frame.t_begin_us,
-                            "a frame of two conversions: its time");
+  TEST_ASSERT_EQUAL_MESSAGE(sensors.begun_us[frame.number + FIRST_FRAME], frame.t_begin_us, "a frame of two conversions: its time");
   int32_t *pressure = &pressure_of[frame.number];
   if (*pressure == 0) {
     *pressure = frame.pressure_Pa_q10[0];
@@ -148,18 +145,14 @@ static void judge_all(void) {
   }
   TEST_ASSERT_FALSE(scan_has_news(&scan));
   uint32_t frames = atomic_load(&scan.counters.frames);
-  TEST_ASSERT_EQUAL_MESSAGE(frames, taken + atomic_load(&scan.counters.frames_skipped),
-                            "a frame is lost and not counted");
+  TEST_ASSERT_EQUAL_MESSAGE(frames, taken + atomic_load(&scan.counters.frames_skipped), "a frame is lost and not counted");
 }
 
 /* After some frames; nothing waits. */
 static void start(void) {
   const struct scan_settings settings = {.sensor_count = SENSORS, .osr = 256};
-  bus = (struct array_bus){.answers_are_single = true,
-                           .start_command = start_command,
-                           .start_read = start_read,
-                           .start_recovery = start_recovery,
-                           .poll = poll};
+  bus = (struct array_bus){
+      .answers_are_single = true, .start_command = start_command, .start_read = start_read, .start_recovery = start_recovery, .poll = poll};
   pressure_of = calloc(NUMBERS, sizeof *pressure_of);
   TEST_ASSERT_NOT_NULL(pressure_of);
   TEST_ASSERT_EQUAL(FT_OK, scan_init(&scan, &bus, &settings));

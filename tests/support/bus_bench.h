@@ -1,5 +1,4 @@
-/* Operations of an array bus, polled as the event handler does: at every event and alarm. Whoever includes it defines
- * NOW_us before. */
+/* Operations of an array bus, polled as the event handler does: at every event and alarm. Whoever includes it defines NOW_us before. */
 #pragma once
 
 #include "array_bus/array_bus.h"

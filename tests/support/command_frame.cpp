@@ -1,5 +1,4 @@
-// command_frame: prints the frame of a command as hexadecimal digits, for tests that write to a
-// fingertip's line themselves.
+// command_frame: prints the frame of a command as hexadecimal digits, for tests that write to a fingertip's line themselves.
 //
 // usage: command_frame [--sequence N] COMMAND [ARGS]
 //

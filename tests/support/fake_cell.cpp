@@ -3,9 +3,8 @@
 //   fake_cell FOLDER [key=value]...       makes FOLDER/left, FOLDER/right, FOLDER/gripper
 //     model=2f85 object=40 stiffness=2 rate=200 active=1
 //
-// object: its width in mm, which does not yield; stiffness: of either pad, N/mm; active: the
-// gripper has been activated. Then each line of standard input is done and answered by the truth,
-// "WIDTH FORCE": the width in mm and the force on either pad in N.
+// object: its width in mm, which does not yield; stiffness: of either pad, N/mm; active: the gripper has been activated. Then each line of
+// standard input is done and answered by the truth, "WIDTH FORCE": the width in mm and the force on either pad in N.
 //
 //   object MM | load N | slide 0|1 | over 0|1 | stall SIDE 0|1 | freeze SIDE 0|1
 //   unplug SIDE|gripper | plug SIDE|gripper | line none|silent|garbage | fault CODE | power 0|1 |
@@ -27,8 +26,7 @@ struct Object {
     test::Feel feel;
     feel.force_N = static_cast<float>(force_N());
     feel.qy_N = static_cast<float>(load_N / 2);
-    feel.flags = (slides ? std::uint32_t{CONTACT_FLAG_SLIDING} : 0u) |
-                 (over ? std::uint32_t{CONTACT_FLAG_FORCE_LOWER_BOUND} : 0u);
+    feel.flags = (slides ? std::uint32_t{CONTACT_FLAG_SLIDING} : 0u) | (over ? std::uint32_t{CONTACT_FLAG_FORCE_LOWER_BOUND} : 0u);
     return feel;
   }
 };
@@ -128,8 +126,7 @@ int main(int argc, char **argv) {
     std::fprintf(stderr, "usage: fake_cell FOLDER [key=value]...\n");
     return 2;
   }
-  std::map<std::string, std::string> options = {
-      {"model", "2f85"}, {"object", "40"}, {"stiffness", "2"}, {"rate", "200"}, {"active", "1"}};
+  std::map<std::string, std::string> options = {{"model", "2f85"}, {"object", "40"}, {"stiffness", "2"}, {"rate", "200"}, {"active", "1"}};
   for (int i = 2; i < argc; i++) {
     const std::string text = argv[i];
     options[text.substr(0, text.find('='))] = text.substr(text.find('=') + 1);

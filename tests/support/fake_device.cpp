@@ -59,8 +59,7 @@ static volatile std::sig_atomic_t ended = 0;
 
 class FakeDevice {
 public:
-  FakeDevice(std::string link, std::map<std::string, std::string> options)
-      : link_(std::move(link)), options_(std::move(options)) {
+  FakeDevice(std::string link, std::map<std::string, std::string> options) : link_(std::move(link)), options_(std::move(options)) {
     wire_info &info = info_.body.info;
     set_text("serial", info.serial);
     set_text("board", info.board);
@@ -341,12 +340,8 @@ private:
       streams_ = command.body.cmd_stream.streams;
       return changed;
     }
-    case WIRE_CMD_RATE:
-      info_.body.info.rate_mHz = command.body.cmd_rate.rate_mHz;
-      return false;
-    case WIRE_CMD_OSR:
-      info_.body.info.osr = command.body.cmd_osr.osr;
-      return false;
+    case WIRE_CMD_RATE: info_.body.info.rate_mHz = command.body.cmd_rate.rate_mHz; return false;
+    case WIRE_CMD_OSR: info_.body.info.osr = command.body.cmd_osr.osr; return false;
     case WIRE_CMD_SLIP:
       info_.body.info.slip_threshold_mm = command.body.cmd_slip.threshold_mm;
       info_.body.info.slip_window_ms = command.body.cmd_slip.window_ms;
@@ -355,15 +350,9 @@ private:
       info_.body.info.prior_sigma_mm = command.body.cmd_prior.sigma_mm;
       info_.body.info.prior_width_mm = command.body.cmd_prior.width_mm;
       return false;
-    case WIRE_CMD_LOCATION_LIMIT:
-      info_.body.info.location_limit_mm = command.body.cmd_location_limit.limit_mm;
-      return false;
-    case WIRE_CMD_SYNC:
-      info_.body.info.sync = command.body.cmd_sync.mode;
-      return false;
-    case WIRE_CMD_KEEP:
-      store(WIRE_STORED_SETTINGS, command.body.cmd_keep.keep != 0);
-      return false;
+    case WIRE_CMD_LOCATION_LIMIT: info_.body.info.location_limit_mm = command.body.cmd_location_limit.limit_mm; return false;
+    case WIRE_CMD_SYNC: info_.body.info.sync = command.body.cmd_sync.mode; return false;
+    case WIRE_CMD_KEEP: store(WIRE_STORED_SETTINGS, command.body.cmd_keep.keep != 0); return false;
     case WIRE_CMD_CALIBRATE:
       info_.body.info.calibration = command.body.cmd_calibrate.calibration;
       store(WIRE_STORED_CALIBRATION, true);
@@ -390,14 +379,9 @@ private:
       /* the answer is read before the port goes */
       fingertip::wait_until(fingertip::host_now() + milliseconds(50));
       return false;
-    case WIRE_CMD_HEALTH:
-      send_health();
-      return false;
-    case WIRE_CMD_CRASH:
-      send(test::make_crash(0, now_us()));
-      return false;
-    default:
-      return false;
+    case WIRE_CMD_HEALTH: send_health(); return false;
+    case WIRE_CMD_CRASH: send(test::make_crash(0, now_us())); return false;
+    default: return false;
     }
   }
 

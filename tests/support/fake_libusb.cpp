@@ -152,17 +152,14 @@ void LIBUSB_CALL libusb_close(libusb_device_handle *handle) {
   delete handle;
 }
 
-int LIBUSB_CALL libusb_get_string_descriptor_ascii(libusb_device_handle *handle, std::uint8_t index,
-                                                   unsigned char *text, int length) {
+int LIBUSB_CALL libusb_get_string_descriptor_ascii(libusb_device_handle *handle, std::uint8_t index, unsigned char *text, int length) {
   const std::string &serial = handle->fake->serial;
   misuse_if(index != 3 || length < static_cast<int>(serial.size()), "string descriptor");
   std::memcpy(text, serial.data(), serial.size());
   return static_cast<int>(serial.size());
 }
 
-int LIBUSB_CALL libusb_kernel_driver_active(libusb_device_handle *handle, int interface) {
-  return handle->fake->driver[interface];
-}
+int LIBUSB_CALL libusb_kernel_driver_active(libusb_device_handle *handle, int interface) { return handle->fake->driver[interface]; }
 
 /* cdc_acm holds both interfaces and lets go of both. */
 int LIBUSB_CALL libusb_detach_kernel_driver(libusb_device_handle *handle, int interface) {
@@ -198,9 +195,8 @@ int LIBUSB_CALL libusb_release_interface(libusb_device_handle *handle, int inter
   return 0;
 }
 
-int LIBUSB_CALL libusb_control_transfer(libusb_device_handle *handle, std::uint8_t type, std::uint8_t request,
-                                        std::uint16_t value, std::uint16_t index, unsigned char *data,
-                                        std::uint16_t length, unsigned) {
+int LIBUSB_CALL libusb_control_transfer(libusb_device_handle *handle, std::uint8_t type, std::uint8_t request, std::uint16_t value,
+                                        std::uint16_t index, unsigned char *data, std::uint16_t length, unsigned) {
   Device &device = *handle->fake;
   if (!device.is_plugged_in) {
     return LIBUSB_ERROR_NO_DEVICE;
@@ -216,8 +212,8 @@ int LIBUSB_CALL libusb_control_transfer(libusb_device_handle *handle, std::uint8
   return length;
 }
 
-int LIBUSB_CALL libusb_bulk_transfer(libusb_device_handle *handle, unsigned char endpoint, unsigned char *data,
-                                     int length, int *transferred, unsigned) {
+int LIBUSB_CALL libusb_bulk_transfer(libusb_device_handle *handle, unsigned char endpoint, unsigned char *data, int length,
+                                     int *transferred, unsigned) {
   Device &device = *handle->fake;
   *transferred = 0;
   if (!device.is_plugged_in) {

@@ -23,8 +23,7 @@ static inline void golden_assert(const char *what, uint32_t cases, const uint32_
       continue;
     }
     char text[300];
-    int at = snprintf(text, sizeof text, "%s %u to %u differ first; now", what, (unsigned)(i * block),
-                      (unsigned)((i + 1) * block - 1));
+    int at = snprintf(text, sizeof text, "%s %u to %u differ first; now", what, (unsigned)(i * block), (unsigned)((i + 1) * block - 1));
     for (uint32_t j = 0; j < GOLDEN_BLOCKS; j++) {
       at += snprintf(text + at, sizeof text - (size_t)at, "%s0x%08X", j ? ", " : " {", (unsigned)found[j]);
     }

@@ -50,8 +50,7 @@ void Repeated::end() {
 }
 
 Served::Served(const GripperServer::Options &options)
-    : motion_(GripperServer::mechanics(options.model)), server_(motion_, options),
-      steps_([this] { server_.step(ROUND); }) {
+    : motion_(GripperServer::mechanics(options.model)), server_(motion_, options), steps_([this] { server_.step(ROUND); }) {
   std::signal(SIGPIPE, SIG_IGN); // of a port that is gone, which is a socket here
 }
 
@@ -119,8 +118,7 @@ std::string asked(const std::string &port, const std::string &question, std::siz
   while (came.size() < answer_length) {
     std::uint8_t bytes[64];
     std::size_t length = 0;
-    if (line.transport().read(bytes, sizeof bytes, &length, std::chrono::milliseconds(2000)) !=
-        Transport::Result::data) {
+    if (line.transport().read(bytes, sizeof bytes, &length, std::chrono::milliseconds(2000)) != Transport::Result::data) {
       break;
     }
     came.insert(came.end(), bytes, bytes + length);

@@ -42,8 +42,7 @@ private:
   Repeated steps_;
 };
 
-/* A line on which exactly these questions come and get these answers, in hexadecimal digits with
- * blanks between bytes; "" is no answer. */
+/* A line on which exactly these questions come and get these answers, in hexadecimal digits with blanks between bytes; "" is no answer. */
 class Tape {
 public:
   explicit Tape(std::vector<std::pair<std::string, std::string>> exchanges);

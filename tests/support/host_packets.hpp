@@ -25,10 +25,9 @@ inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std:
   wire_packet packet = make_packet(WIRE_CONTACT, sequence, t_us);
   wire_contact &contact = packet.body.contact;
   contact.frame = frame;
-  contact.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                  CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_WIDTHS_VALID |
-                  CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_SHAPE_VALID |
-                  CONTACT_FLAG_EDGE;
+  contact.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SLIP_VALID |
+                  CONTACT_FLAG_TARED | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID |
+                  CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE;
   contact.sensors_used = 0x7FFF;
   contact.x_mm = 0.1f + static_cast<float>(frame % 10);
   contact.y_mm = -3.3333333f;
@@ -56,8 +55,7 @@ inline wire_packet make_contact(std::uint16_t sequence, std::uint64_t t_us, std:
   return packet;
 }
 
-inline wire_packet make_raw(std::uint16_t sequence, std::uint64_t t_us, std::uint32_t frame,
-                            std::uint8_t sensor_count = 15) {
+inline wire_packet make_raw(std::uint16_t sequence, std::uint64_t t_us, std::uint32_t frame, std::uint8_t sensor_count = 15) {
   wire_packet packet = make_packet(WIRE_RAW, sequence, t_us);
   wire_raw &raw = packet.body.raw;
   raw.frame = frame;

@@ -34,8 +34,7 @@ struct pad_load {
 };
 
 /* Pressure under the pad this far from the middle of a contact with this spread, by the definition in pad_profile.h. */
-static inline double pad_pressure_Pa(const struct pad_profile *pad, double spread_mm2, double dx_mm, double dy_mm,
-                                     struct pad_load load) {
+static inline double pad_pressure_Pa(const struct pad_profile *pad, double spread_mm2, double dx_mm, double dy_mm, struct pad_load load) {
   const double two_pi = 6.28318530717958, r2 = dx_mm * dx_mm + dy_mm * dy_mm;
   double sum = 0.0; /* N/mm^2 */
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
@@ -44,8 +43,7 @@ static inline double pad_pressure_Pa(const struct pad_profile *pad, double sprea
   }
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
     const double v = (double)pad->tangential[j].sd_mm * (double)pad->tangential[j].sd_mm + 1.3 * spread_mm2;
-    sum += (load.qx_N * dx_mm + load.qy_N * dy_mm) * (double)pad->tangential[j].moment_mm / (two_pi * v * v) *
-           exp(-r2 / (2 * v));
+    sum += (load.qx_N * dx_mm + load.qy_N * dy_mm) * (double)pad->tangential[j].moment_mm / (two_pi * v * v) * exp(-r2 / (2 * v));
   }
   return sum * 1e6;
 }

@@ -61,12 +61,10 @@ struct KnownPad {
       pulled += press.slope * strength * u / width_mm * std::exp(-square / (2.0 * ratio * ratio * width_mm * width_mm));
     }
     return PEAK_Pa * press.force *
-           (std::pow(1.0 + square / (2.0 * n * width_mm * width_mm), -n) + pulled -
-            dip * std::exp(-square / (2.0 * dip_mm * dip_mm)));
+           (std::pow(1.0 + square / (2.0 * n * width_mm * width_mm), -n) + pulled - dip * std::exp(-square / (2.0 * dip_mm * dip_mm)));
   }
 
-  fingertip::calibrating::Placement place(const Press &press, double t_s, fingertip::Random &random,
-                                          double noise_Pa = 1.0) const {
+  fingertip::calibrating::Placement place(const Press &press, double t_s, fingertip::Random &random, double noise_Pa = 1.0) const {
     fingertip::calibrating::Placement placement;
     placement.t_s = t_s;
     placement.usable = (1u << array.sensors()) - 1u;
@@ -79,8 +77,8 @@ struct KnownPad {
 };
 
 /* Anywhere on the array, one weight, one every four seconds. */
-inline std::vector<fingertip::calibrating::Placement> good_session(const KnownPad &pad, std::size_t count,
-                                                                   std::uint64_t seed, double slope = 0.0) {
+inline std::vector<fingertip::calibrating::Placement> good_session(const KnownPad &pad, std::size_t count, std::uint64_t seed,
+                                                                   double slope = 0.0) {
   fingertip::Random random(seed, 2, 0);
   std::vector<fingertip::calibrating::Placement> placements;
   for (std::size_t i = 0; i < count; i++) {

@@ -1,6 +1,5 @@
-// libfingertip's clock, simulated: programs that are linked with this one instead live on the time
-// of a time keeper (time_keeper.cpp), whose socket the environment names. One thread of all those
-// programs runs at a time; time passes only while all of them wait.
+// libfingertip's clock, simulated: programs that are linked with this one instead live on the time of a time keeper (time_keeper.cpp),
+// whose socket the environment names. One thread of all those programs runs at a time; time passes only while all of them wait.
 #include "libfingertip/clock.hpp"
 #include "support/time_keeper.hpp"
 

@@ -19,9 +19,7 @@
 
 namespace fingertip {
 
-static Error failure(const std::string &what) {
-  return Error(ErrorCode::cannot_open, what + " (" + std::strerror(errno) + ")");
-}
+static Error failure(const std::string &what) { return Error(ErrorCode::cannot_open, what + " (" + std::strerror(errno) + ")"); }
 
 static std::string own_name() {
   static std::atomic<unsigned> number{0};
@@ -53,8 +51,7 @@ void ServedPort::make_raw() {
   std::memcpy(address.sun_path, path_.data(), path_.size());
   unlink(path_.c_str());
   listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 ||
-      listen(listener_, 8) != 0) {
+  if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 || listen(listener_, 8) != 0) {
     throw failure(path_);
   }
 }

@@ -122,8 +122,7 @@ private:
     const float noise = frozen ? 0 : 1e-3f * static_cast<float>(frame_ % 17);
     contact.flags = CONTACT_FLAG_TARED | feel.flags;
     if (touches) {
-      contact.flags |= CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                       CONTACT_FLAG_TANGENTIAL_VALID;
+      contact.flags |= CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TANGENTIAL_VALID;
       contact.force_N = feel.force_N + noise;
       contact.x_mm = noise;
       contact.y_mm = 2;

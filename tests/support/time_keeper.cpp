@@ -3,13 +3,11 @@
 //   time_keeper SOCKET              prints "ready" once it listens there
 //   time_keeper --run TEST [...]    starts a test that is such a process, ends with its status
 //
-// and ends with its first connection, the test's. Of all the threads that are connected (simulated_clock.cpp,
-// simulated_time.py) one runs at a time. When it waits, the next is one that has something to go on with, longest not
-// run first; where none has, time jumps to the first moment that somebody waits for. So what happens, and when, is the
-// same however fast the machine is, and silence takes no time.
+// and ends with its first connection, the test's. Of all the threads that are connected (simulated_clock.cpp, simulated_time.py) one runs
+// at a time. When it waits, the next is one that has something to go on with, longest not run first; where none has, time jumps to the
+// first moment that somebody waits for. So what happens, and when, is the same however fast the machine is, and silence takes no time.
 //
-// A thread that runs for two minutes of real time, and a world in which everybody waits for ever,
-// end it with a word on standard error.
+// A thread that runs for two minutes of real time, and a world in which everybody waits for ever, end it with a word on standard error.
 #include "support/time_keeper.hpp"
 
 #include <algorithm>
@@ -100,8 +98,7 @@ public:
     }
     std::strcpy(address.sun_path, path);
     listener_ = Descriptor(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-    if (bind(listener_.get(), reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 ||
-        listen(listener_.get(), 64) != 0) {
+    if (bind(listener_.get(), reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 || listen(listener_.get(), 64) != 0) {
       fail(std::strerror(errno));
     }
   }
@@ -278,9 +275,7 @@ private:
       client.runs = false;
       client.line = Descriptor();
       break;
-    case Order::SPAWNED:
-      expect(order.pid);
-      break;
+    case Order::SPAWNED: expect(order.pid); break;
     case Order::HELD:
       for (Process &each : processes_) {
         each.held_us = each.pid == order.pid ? order.until_us : each.held_us;
@@ -297,8 +292,7 @@ private:
         its->expects_signal = true;
       }
       break;
-    default:
-      fail("an order that is none");
+    default: fail("an order that is none");
     }
   }
 
@@ -388,8 +382,7 @@ private:
     unlink(path.c_str());
     rmdir(folder.c_str());
     if (WIFSIGNALED(status)) {
-      std::fprintf(stderr, "time_keeper: the test was ended by signal %d (%s)\n", WTERMSIG(status),
-                   strsignal(WTERMSIG(status)));
+      std::fprintf(stderr, "time_keeper: the test was ended by signal %d (%s)\n", WTERMSIG(status), strsignal(WTERMSIG(status)));
     }
     std::exit(WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status));
   });

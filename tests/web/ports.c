@@ -46,8 +46,7 @@ static const char *folder(void) {
 }
 
 static bool is_port(const char *name) {
-  return name[0] != '.' && strlen(name) > 2 * (ID_DIGITS + 1) && name[ID_DIGITS] == ':' &&
-         name[2 * ID_DIGITS + 1] == ':';
+  return name[0] != '.' && strlen(name) > 2 * (ID_DIGITS + 1) && name[ID_DIGITS] == ':' && name[2 * ID_DIGITS + 1] == ':';
 }
 
 static struct udev_device *device_of(const char *name, const char *action) {
@@ -134,7 +133,7 @@ API const char *udev_device_get_property_value(struct udev_device *device, const
 }
 
 /* What else a browser may ask, with whatever arguments: there is nothing. */
-#define NOTHING(name)                                                                                                  \
+#define NOTHING(name)                                                                                                                      \
   API void *name(void) { return NULL; }
 NOTHING(udev_device_get_devtype)
 NOTHING(udev_device_get_driver)

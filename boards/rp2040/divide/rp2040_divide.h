@@ -1,6 +1,5 @@
-/* port_divide() on the divider of the SIO: 8 cycles after the divisor is written (RP2040 datasheet
- * 2.3.1.5). One per core and not saved by interrupts, so no handler may divide with it:
- * port/divide.h leaves it to the main context, and libgcc's own division does not use it. */
+/* port_divide() on the divider of the SIO: 8 cycles after the divisor is written (RP2040 datasheet 2.3.1.5). One per core and not saved by
+ * interrupts, so no handler may divide with it: port/divide.h leaves it to the main context, and libgcc's own division does not use it. */
 #pragma once
 
 #include <stdint.h>

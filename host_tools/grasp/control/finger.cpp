@@ -24,10 +24,9 @@ constexpr double SHARED_N = 0.3; // a load whose share of both has a meaning
 // far it reaches beyond the pad is not.
 constexpr double FORCE_SD_MOST = 1.0;
 // A tangential force with one of these flags is not trusted.
-constexpr std::uint32_t FORCE_ONLY = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND |
-                                     CONTACT_FLAG_SATURATED | CONTACT_FLAG_ZERO_DOUBTFUL;
-// A place with one of these flags is not trusted. UNCERTAIN says that a pull may have moved it, which is what it is
-// for.
+constexpr std::uint32_t FORCE_ONLY =
+    CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SATURATED | CONTACT_FLAG_ZERO_DOUBTFUL;
+// A place with one of these flags is not trusted. UNCERTAIN says that a pull may have moved it, which is what it is for.
 constexpr std::uint32_t NO_PLACE = FORCE_ONLY & ~std::uint32_t{CONTACT_FLAG_UNCERTAIN};
 // A pull of the contact's own force moves its place by this many sigmas, and more, whatever its shape: points by 0.62,
 // lines up to 24 mm by 0.55, areas up to 18 mm by 0.5, of 24 mm by 0.48 (12 mm of rubber; near corners 0.35 to 0.55).
@@ -49,14 +48,13 @@ static bool force_is_valid(const GripTouch &touch) {
   if ((touch.flags & CONTACT_FLAG_CONTACT) == 0) {
     return true; // the force is 0
   }
-  return (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 &&
-         (touch.sigma_mm > WIDE_mm || (touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 ||
-          touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
+  return (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (touch.sigma_mm > WIDE_mm || (touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 ||
+                                                         touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
 }
 
 static bool is_same(const GripTouch &a, const GripTouch &b) {
-  return a.force_N == b.force_N && a.force_sd_N == b.force_sd_N && a.x_mm == b.x_mm && a.y_mm == b.y_mm &&
-         a.qx_N == b.qx_N && a.qy_N == b.qy_N;
+  return a.force_N == b.force_N && a.force_sd_N == b.force_sd_N && a.x_mm == b.x_mm && a.y_mm == b.y_mm && a.qx_N == b.qx_N &&
+         a.qy_N == b.qy_N;
 }
 
 void GripFinger::take(const GripTouch &touch) {
@@ -94,9 +92,7 @@ void GripFinger::take(const GripTouch &touch) {
   }
 }
 
-bool GripFinger::has_load() const {
-  return (touch_.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 && (touch_.flags & FORCE_ONLY) == 0;
-}
+bool GripFinger::has_load() const { return (touch_.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 && (touch_.flags & FORCE_ONLY) == 0; }
 
 void GripFinger::begin_zero() {
   of_both_ = 1.0; // another object
@@ -134,8 +130,7 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
   const bool stale = !is_heard_ || now_s > heard_s_ + settings.stale_s || now_s > touch_.t_s + OLD_s;
   const bool frozen = !stale && unchanged_ >= FROZEN_FRAMES && touch_.t_s - changed_s_ >= FROZEN_s;
   const bool no_force = !stale && now_s > force_s_ + settings.stale_s;
-  reading.trouble = (stale ? GRIP_FINGER_0_STALE : 0u) | (frozen ? GRIP_FINGER_0_FROZEN : 0u) |
-                    (no_force ? GRIP_FINGER_0_NO_FORCE : 0u) |
+  reading.trouble = (stale ? GRIP_FINGER_0_STALE : 0u) | (frozen ? GRIP_FINGER_0_FROZEN : 0u) | (no_force ? GRIP_FINGER_0_NO_FORCE : 0u) |
                     (!stale && delay_s_ > settings.late_s ? GRIP_FINGER_0_LATE : 0u);
   reading.counts = !stale && !frozen;
   if (!reading.counts) {
@@ -157,8 +152,7 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
     reading.load_N = std::hypot(reading.load_x_N, reading.load_y_N);
     reading.load_sd_N = std::max(touch_.q_sd_N, LOAD_SD_LEAST_N);
     reading.speed_mm_s = std::hypot(touch_.speed_x_mm_s, touch_.speed_y_mm_s);
-    recoils = reading.load_N > SHARED_N &&
-              touch_.speed_x_mm_s * reading.load_x_N + touch_.speed_y_mm_s * reading.load_y_N < 0.0;
+    recoils = reading.load_N > SHARED_N && touch_.speed_x_mm_s * reading.load_x_N + touch_.speed_y_mm_s * reading.load_y_N < 0.0;
   }
   reading.has_place = reading.contact && touch_.t_s < place_t_s_ + settings.stale_s;
   reading.pulled = reading.has_place ? pulled_ : 0.0;
@@ -198,21 +192,17 @@ void GripFinger::doubt(const GripReading &reading) {
   is_doubted_ = true;
 }
 
-double GripFinger::doubted_for_s(const GripReading &reading) const {
-  return is_doubted_ ? reading.t_s - doubted_s_ : 0.0;
-}
+double GripFinger::doubted_for_s(const GripReading &reading) const { return is_doubted_ ? reading.t_s - doubted_s_ : 0.0; }
 
 using Readings = std::array<GripReading, GRIP_FINGERS>;
 
 // Replaces a reading that is doubted by the last one that was believed, or leaves the fingertip out.
-static void judge(std::array<GripFinger, GRIP_FINGERS> &fingers, Readings &readings, const GripSettings &settings,
-                  const GripReach &reach) {
+static void judge(std::array<GripFinger, GRIP_FINGERS> &fingers, Readings &readings, const GripSettings &settings, const GripReach &reach) {
   std::array<bool, GRIP_FINGERS> explained{}, lasts{};
   for (std::size_t i = 0; i < fingers.size(); i++) {
     const GripReading &reading = readings[i], &before = fingers[i].believed();
     lasts[i] = fingers[i].doubted_for_s(reading) >= settings.stale_s;
-    explained[i] = reading.has_force && !lasts[i] &&
-                   reach.explains(before.force_N, before.t_s, reading.force_N, reading.t_s, settings);
+    explained[i] = reading.has_force && !lasts[i] && reach.explains(before.force_N, before.t_s, reading.force_N, reading.t_s, settings);
   }
   const bool both = readings[0].has_force && readings[1].has_force;
   const double differ_N = std::abs(readings[0].force_N - readings[1].force_N);
@@ -302,8 +292,7 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   } else {
     all.mean_N /= all.fingers;
   }
-  // An object in the air presses on both alike, so the mean is the better estimate. The further they
-  // differ, the less is believed.
+  // An object in the air presses on both alike, so the mean is the better estimate. The further they differ, the less is believed.
   all.grip_N = std::max(all.low_N, all.mean_N - std::max(all.high_N - all.low_N - settings.differ * all.high_N, 0.0));
   // One fingertip alone is not believed to carry more than two thirds.
   all.place_N = std::min(2.0 * least_pull_N, most_pull_N);

@@ -4,13 +4,12 @@
 
 namespace fingertip {
 
-// An error below this share of the effect of the gripper's least move is ignored: no move would
-// reduce it, and the gripper would oscillate. Settled rubber loses more force when the gripper opens
-// than it gains when the gripper closes, so the two shares differ.
+// An error below this share of the effect of the gripper's least move is ignored: no move would reduce it, and the gripper would oscillate.
+// Settled rubber loses more force when the gripper opens than it gains when the gripper closes, so the two shares differ.
 constexpr double CLOSES = 0.625, OPENS = 1.0;
 
-std::uint32_t GripFixed::step(const GripReadings &readings, const GripSettings &settings, const GripperTraits &traits,
-                              double now_s, GripReach &reach) {
+std::uint32_t GripFixed::step(const GripReadings &readings, const GripSettings &settings, const GripperTraits &traits, double now_s,
+                              GripReach &reach) {
   std::uint32_t trouble = 0;
   if (readings.fingers == 0 || (runs_ && now_s - stepped_s_ < settings.control_s)) {
     return trouble;

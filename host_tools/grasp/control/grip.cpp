@@ -32,8 +32,7 @@ constexpr double ONLY_HELD_s = 1.0; // without a load for this time
 
 static double seconds(const GripperStatus &status) { return 1e-6 * static_cast<double>(status.host_us); }
 
-Grip::Grip(const GripSettings &settings, const GripperTraits &traits)
-    : settings_(settings), traits_(traits), reach_(traits) {}
+Grip::Grip(const GripSettings &settings, const GripperTraits &traits) : settings_(settings), traits_(traits), reach_(traits) {}
 
 void Grip::take(std::size_t finger, const GripTouch &touch) {
   if (finger < fingers_.size()) {
@@ -60,15 +59,14 @@ void Grip::enter(GripState state) {
 }
 
 bool Grip::is_grasping() const {
-  return state_ == GRIP_SQUEEZE || state_ == GRIP_READY || state_ == GRIP_HOLDING || state_ == GRIP_SLIPPING ||
-         state_ == GRIP_PLACING || state_ == GRIP_HANDING || (state_ == GRIP_STILL && still_grasps_);
+  return state_ == GRIP_SQUEEZE || state_ == GRIP_READY || state_ == GRIP_HOLDING || state_ == GRIP_SLIPPING || state_ == GRIP_PLACING ||
+         state_ == GRIP_HANDING || (state_ == GRIP_STILL && still_grasps_);
 }
 
 bool Grip::request(GripRequest request) {
   switch (request) {
   case GRIP_REQUEST_GRASP:
-    if (state_ != GRIP_IDLE && state_ != GRIP_OPEN && state_ != GRIP_DROPPED && state_ != GRIP_MISSED &&
-        state_ != GRIP_STILL) {
+    if (state_ != GRIP_IDLE && state_ != GRIP_OPEN && state_ != GRIP_DROPPED && state_ != GRIP_MISSED && state_ != GRIP_STILL) {
       return false;
     }
     hold_.begin();
@@ -103,8 +101,7 @@ bool Grip::request(GripRequest request) {
     holds_ = request == GRIP_REQUEST_PLACE ? GRIP_PLACING : GRIP_HANDING;
     enter(holds_);
     return true;
-  default:
-    return false;
+  default: return false;
   }
 }
 
@@ -190,8 +187,7 @@ void Grip::approach() {
 
 std::uint32_t Grip::aim(const GripAim &aim) {
   GripAim below = aim;
-  wanted_N_ = below.wanted_N =
-      std::min(aim.wanted_N, readings_.high_N > settings_.cap_N ? BELOW_CAP * settings_.cap_N : settings_.cap_N);
+  wanted_N_ = below.wanted_N = std::min(aim.wanted_N, readings_.high_N > settings_.cap_N ? BELOW_CAP * settings_.cap_N : settings_.cap_N);
   return (aim.wanted_N >= settings_.cap_N ? GRIP_AT_CAP : 0u) | reach_.aim(below, readings_, settings_, now_s_);
 }
 
@@ -206,8 +202,8 @@ std::uint32_t Grip::squeeze() {
   }
   const double from_N = is_blind_ ? settings_.first_N() : settings_.touch_N;
   const double risen_N = from_N + (aimed_N - from_N) * std::min((now_s_ - since_s_) / RISES_s, 1.0);
-  const std::uint32_t trouble = fixed ? fixed_.step(readings_, settings_, traits_, now_s_, reach_)
-                                      : aim({risen_N, GripAim::Haste::patient, settings_.sets_force()});
+  const std::uint32_t trouble =
+      fixed ? fixed_.step(readings_, settings_, traits_, now_s_, reach_) : aim({risen_N, GripAim::Haste::patient, settings_.sets_force()});
   wanted_N_ = fixed ? settings_.set_N : wanted_N_;
   // A force as near to it as a move brings it is enough as well.
   const bool nearest = !fixed && readings_.fingers > 0 && reach_.has_come(now_s_, readings_.t_s);
@@ -215,9 +211,9 @@ std::uint32_t Grip::squeeze() {
   const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, readings_.t_s);
   // A detour brings it one step nearer: to a set force, or if the grip is far too weak.
   const bool may_detour = nearest && (capped || there);
-  if (may_detour && (settings_.sets_force() ? reach_.start_detour_to(settings_.start_N, readings_, settings_, now_s_)
-                                            : readings_.low_N < SQUEEZED * aimed_N &&
-                                                  reach_.start_detour_closer(readings_, settings_, now_s_))) {
+  if (may_detour &&
+      (settings_.sets_force() ? reach_.start_detour_to(settings_.start_N, readings_, settings_, now_s_)
+                              : readings_.low_N < SQUEEZED * aimed_N && reach_.start_detour_closer(readings_, settings_, now_s_))) {
     enter(GRIP_APPROACH);
     return trouble;
   }
@@ -316,26 +312,20 @@ std::uint32_t Grip::go_on() {
     // Activation opens a gripper, so it waits until nothing is between the fingers.
     may_activate_ = may_activate_ || (readings_.fingers > 0 && readings_.touches == 0);
     return may_activate_ && now_s_ - since_s_ < ACTIVATION_s ? 0u : GRIP_GRIPPER_INACTIVE;
-  case GRIP_APPROACH:
-    approach();
-    return 0;
-  case GRIP_SQUEEZE:
-    return squeeze();
-  case GRIP_READY:
-    return make_ready();
+  case GRIP_APPROACH: approach(); return 0;
+  case GRIP_SQUEEZE: return squeeze();
+  case GRIP_READY: return make_ready();
   case GRIP_HOLDING:
   case GRIP_SLIPPING:
   case GRIP_PLACING:
-  case GRIP_HANDING:
-    return hold();
+  case GRIP_HANDING: return hold();
   case GRIP_RELEASE:
     ramp(settings_.release_width_mm, settings_.release_mm_s);
     if (status_.width_mm >= settings_.release_width_mm - WIDTH_SLACK_mm) {
       enter(GRIP_OPEN);
     }
     return 0;
-  default:
-    return 0;
+  default: return 0;
   }
 }
 
@@ -356,26 +346,16 @@ void Grip::fill(GripCommand &command) const {
   command.width_mm = reach_.target_mm();
   double speed_mm_s = traits_.speed_max_mm_s;
   switch (state_) {
-  case GRIP_ACTIVATING:
-    command.motion = may_activate_ ? GRIP_ACTIVATE : GRIP_STAY;
-    return;
-  case GRIP_APPROACH:
-    speed_mm_s = settings_.approach_mm_s;
-    break;
-  case GRIP_RELEASE:
-    speed_mm_s = settings_.release_mm_s;
-    break;
+  case GRIP_ACTIVATING: command.motion = may_activate_ ? GRIP_ACTIVATE : GRIP_STAY; return;
+  case GRIP_APPROACH: speed_mm_s = settings_.approach_mm_s; break;
+  case GRIP_RELEASE: speed_mm_s = settings_.release_mm_s; break;
   case GRIP_SQUEEZE:
   case GRIP_READY:
   case GRIP_HOLDING:
   case GRIP_PLACING:
-  case GRIP_HANDING:
-    speed_mm_s = std::abs(reach_.target_mm() - status_.width_mm) / MOVE_s;
-    break;
-  case GRIP_SLIPPING:
-    break;
-  default:
-    return;
+  case GRIP_HANDING: speed_mm_s = std::abs(reach_.target_mm() - status_.width_mm) / MOVE_s; break;
+  case GRIP_SLIPPING: break;
+  default: return;
   }
   if ((trouble_ & (GRIP_GRIPPER_SILENT | GRIP_GRIPPER_FAULTS)) != 0) {
     return;

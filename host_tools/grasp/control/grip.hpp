@@ -47,10 +47,9 @@ public:
   void take(std::size_t finger, const GripTouch &touch);
   void take(const GripperStatus &status);
 
-  // GRASP: from IDLE, OPEN, DROPPED, MISSED, STILL. HOLD: the width stays, from every state but
-  // FAULT. RELEASE: opens, from every state but a FAULT of the gripper itself. False: not from this
-  // state. PLACE and HAND_OVER: from HOLDING in mode hold, PLACE with a load of 0.15 N and more: until it opens, a
-  // load against the present one, or a pull, does not raise the grip. HOLD ends them.
+  // GRASP: from IDLE, OPEN, DROPPED, MISSED, STILL. HOLD: the width stays, from every state but FAULT. RELEASE: opens, from every state but
+  // a FAULT of the gripper itself. False: not from this state. PLACE and HAND_OVER: from HOLDING in mode hold, PLACE with a load of 0.15 N
+  // and more: until it opens, a load against the present one, or a pull, does not raise the grip. HOLD ends them.
   bool request(GripRequest request);
 
   // Other settings from the next step on, in any state. False: their mode is another; nothing changes.

@@ -61,9 +61,7 @@ void GripLoad::rests(double load_N, double sd_N, double passed_s, bool swings) {
   }
 }
 
-double GripLoad::ahead_N(double seconds) const {
-  return load_N_ + std::min(rate_N_s_ * seconds, std::max(AHEAD * load_N_, AHEAD_N));
-}
+double GripLoad::ahead_N(double seconds) const { return load_N_ + std::min(rate_N_s_ * seconds, std::max(AHEAD * load_N_, AHEAD_N)); }
 
 bool GripLoad::is_steady() const { return rate_N_s_ * STEADY_s < std::max(STEADY * load_N_, STEADY_N); }
 
@@ -78,8 +76,7 @@ void GripLoad::slides_at(double load_N, double speed_mm_s, double passed_s) {
 void GripHold::begin() { *this = GripHold(); }
 
 double GripHold::need_N(const GripSettings &settings, double delay_s, double dead_s) const {
-  const double load_N =
-      sliding_ ? load_.now_N() : std::max({load_.ahead_N(dead_s), was_N_, settings.expected_N(was_loaded_)});
+  const double load_N = sliding_ ? load_.now_N() : std::max({load_.ahead_N(dead_s), was_N_, settings.expected_N(was_loaded_)});
   const double margin = settings.margin + MARGIN_1_s * late_s(delay_s);
   return (slides_ > 0 ? settings.slid : 1.0) * margin * load_N / friction(settings);
 }
@@ -125,8 +122,7 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
   was_loaded_ = was_loaded_ || now_s - steady_s_ > LOADED_s;
 }
 
-double GripHold::wants(const GripReadings &readings, double coming_N, const GripSettings &settings, double now_s,
-                       double dead_s) {
+double GripHold::wants(const GripReadings &readings, double coming_N, const GripSettings &settings, double now_s, double dead_s) {
   const double passed_s = begun_ ? now_s - now_s_ : 0.0;
   if (!begun_) {
     begun_ = true;
@@ -141,9 +137,7 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
   const double least_known_N = settings.mass_kg > 0.0 ? settings.first_N() : settings.floor_N + late_N;
   const double by_place_N = std::max(settings.margin * place_.ahead_N(dead_s) / settings.friction, least_known_N);
   const double blind_N = readings.has_place ? std::min(by_place_N, settings.unseen_N()) : settings.unseen_N();
-  const double least_N = !has_seen_load_ && !readings.has_load ? blind_N
-                         : was_loaded_                         ? settings.floor_N + late_N
-                                                               : settings.first_N();
+  const double least_N = !has_seen_load_ && !readings.has_load ? blind_N : was_loaded_ ? settings.floor_N + late_N : settings.first_N();
   double need = std::max(need_N(settings, readings.delay_s, dead_s), least_N);
   if (goes_on_ && !readings.has_load) {
     need = std::max(need, MORE * readings.grip_N);

@@ -7,8 +7,7 @@
 
 namespace fingertip {
 
-// The friction coefficient: the largest ratio of tangential to normal force that held since a slide, and the
-// least that slid.
+// The friction coefficient: the largest ratio of tangential to normal force that held since a slide, and the least that slid.
 class GripFriction {
 public:
   void held(double ratio);
@@ -29,8 +28,7 @@ class GripLoad {
 public:
   // Updates from a contact that rests. sd_N: less is no rise. swings: it was caught, and swings on the rubber.
   void rests(double load_N, double sd_N, double passed_s, bool swings);
-  // Updates from a contact that slides and does not slow down: its load is at least its friction, and
-  // stopping it takes more.
+  // Updates from a contact that slides and does not slow down: its load is at least its friction, and stopping it takes more.
   void slides_at(double load_N, double speed_mm_s, double passed_s);
 
   double now_N() const { return load_N_; }
@@ -45,10 +43,8 @@ private:
 class GripHold {
 public:
   void begin();
-  // The wanted force. coming_N: the grip after the moves under way. dead_s: from a motion of the
-  // object to the motion of the gripper.
-  double wants(const GripReadings &readings, double coming_N, const GripSettings &settings, double now_s,
-               double dead_s);
+  // The wanted force. coming_N: the grip after the moves under way. dead_s: from a motion of the object to the motion of the gripper.
+  double wants(const GripReadings &readings, double coming_N, const GripSettings &settings, double now_s, double dead_s);
   double friction(const GripSettings &settings) const { return friction_.value(settings.friction); }
   bool is_set() const { return is_set_; } // a set force without a load
   double load_N() const { return load_.now_N(); }

@@ -41,14 +41,10 @@ static double most_N(const GripReadings &readings) {
   return readings.high_N + SDS * std::clamp(readings.sd_N, SD_LEAST * readings.high_N, SD_MOST * readings.high_N);
 }
 
-static double indentation_mm(double width_mm, double touch_mm) {
-  return std::max(touch_mm + TOUCHED_mm - width_mm, TOUCHED_mm);
-}
+static double indentation_mm(double width_mm, double touch_mm) { return std::max(touch_mm + TOUCHED_mm - width_mm, TOUCHED_mm); }
 
 // One pad's indentation at this force, by a power law.
-static double way_to_mm(double force_N, double at_1_mm_N, double exponent) {
-  return std::pow(force_N / at_1_mm_N, 1.0 / exponent);
-}
+static double way_to_mm(double force_N, double at_1_mm_N, double exponent) { return std::pow(force_N / at_1_mm_N, 1.0 / exponent); }
 
 // The pad's force at 1 mm, if this travel turned one force into the other.
 static double shown_at_1_mm_N(double from_N, double to_N, double way_mm, double exponent) {
@@ -63,8 +59,7 @@ void GripRubber::begin(double width_mm) {
 
 double GripRubber::force_at(double to_mm, double force_N, double from_mm) const {
   const double grown = indentation_mm(to_mm, both_mm_) / indentation_mm(from_mm, both_mm_);
-  return std::max(0.0, force_N + std::max(force_N, LEAST_N) * (std::pow(grown, EXPONENT) - 1.0) *
-                                     (to_mm < from_mm ? closing_ : opening_));
+  return std::max(0.0, force_N + std::max(force_N, LEAST_N) * (std::pow(grown, EXPONENT) - 1.0) * (to_mm < from_mm ? closing_ : opening_));
 }
 
 double GripRubber::width_for(double wanted_N, double force_N, double from_mm) const {
@@ -108,8 +103,7 @@ double GripBound::width_below(double cap_N, double force_N, double from_mm) cons
   for (std::size_t i = 0; i < EXPONENTS.size(); i++) {
     const double elastic_N = RELAXED * force_N;
     const double most_N = std::max(elastic_N + cap_N - force_N, 0.0);
-    travel_mm = std::min(travel_mm, way_to_mm(most_N, at_1_mm_N_[i], EXPONENTS[i]) -
-                                        way_to_mm(elastic_N, at_1_mm_N_[i], EXPONENTS[i]));
+    travel_mm = std::min(travel_mm, way_to_mm(most_N, at_1_mm_N_[i], EXPONENTS[i]) - way_to_mm(elastic_N, at_1_mm_N_[i], EXPONENTS[i]));
   }
   return from_mm - 2.0 * travel_mm;
 }
@@ -194,17 +188,11 @@ double GripReach::coming_mm(double now_s) const {
   return stays ? status_.width_mm : target_mm_;
 }
 
-double GripReach::least_mm() const {
-  return traits_.step_mm * std::max(1.0, std::ceil(traits_.deadband_mm / traits_.step_mm - 1e-9));
-}
+double GripReach::least_mm() const { return traits_.step_mm * std::max(1.0, std::ceil(traits_.deadband_mm / traits_.step_mm - 1e-9)); }
 
-bool GripReach::limits_itself(const GripSettings &settings) const {
-  return traits_.force_min_N <= LIMIT * settings.cap_N;
-}
+bool GripReach::limits_itself(const GripSettings &settings) const { return traits_.force_min_N <= LIMIT * settings.cap_N; }
 
-double GripReach::least_move_N(double force_N) const {
-  return rubber_.force_at(target_mm_ - least_mm(), force_N, target_mm_) - force_N;
-}
+double GripReach::least_move_N(double force_N) const { return rubber_.force_at(target_mm_ - least_mm(), force_N, target_mm_) - force_N; }
 
 double GripReach::coming_N(const GripReadings &readings, double now_s) const {
   return rubber_.force_at(coming_mm(now_s), readings.grip_N, width_at(readings.t_s));
@@ -216,8 +204,7 @@ double GripReach::last_below_cap_mm(const GripReadings &readings, const GripSett
   return target_mm_ - std::max(steps, 0.0) * traits_.step_mm;
 }
 
-double GripReach::allowed(double width_mm, const GripReadings &readings, const GripSettings &settings,
-                          std::uint32_t &trouble) const {
+double GripReach::allowed(double width_mm, const GripReadings &readings, const GripSettings &settings, std::uint32_t &trouble) const {
   const double least_mm = touch_width_mm() - settings.travel_cap_mm;
   if (width_mm < least_mm) {
     width_mm = least_mm;
@@ -234,8 +221,7 @@ double GripReach::allowed(double width_mm, const GripReadings &readings, const G
 bool GripReach::explains(double from_N, double from_s, double to_N, double to_s, const GripSettings &settings) const {
   const double from_mm = width_at(from_s);
   const auto [narrow_mm, wide_mm] = std::minmax({from_mm, width_at(to_s), status_.width_mm, target_mm_});
-  const double least_N = rubber_.force_at(wide_mm, from_N, from_mm),
-               most_N = rubber_.force_at(narrow_mm, from_N, from_mm);
+  const double least_N = rubber_.force_at(wide_mm, from_N, from_mm), most_N = rubber_.force_at(narrow_mm, from_N, from_mm);
   return knows(from_s) && to_N >= least_N - settings.alike_N(least_N) && to_N <= most_N + settings.alike_N(most_N);
 }
 
@@ -247,8 +233,7 @@ bool GripReach::can_detour(const GripReadings &readings) const {
   return least_mm() > traits_.step_mm && !readings.is_alone() && !readings.over;
 }
 
-double GripReach::travel_below_cap_mm(const GripReadings &readings, const GripSettings &settings,
-                                      double coming_mm) const {
+double GripReach::travel_below_cap_mm(const GripReadings &readings, const GripSettings &settings, double coming_mm) const {
   return coming_mm - bound_.width_below(settings.cap_N, most_N(readings), width_at(readings.t_s));
 }
 
@@ -262,16 +247,14 @@ void GripReach::begin_detour(double to_mm, double now_s) {
 
 bool GripReach::start_detour_closer(const GripReadings &readings, const GripSettings &settings, double now_s) {
   const double coming = coming_mm(now_s);
-  const bool goes = !limits_itself(settings) && can_detour(readings) &&
-                    travel_below_cap_mm(readings, settings, coming) > traits_.step_mm;
+  const bool goes = !limits_itself(settings) && can_detour(readings) && travel_below_cap_mm(readings, settings, coming) > traits_.step_mm;
   if (goes) {
     begin_detour(coming - traits_.step_mm, now_s);
   }
   return goes;
 }
 
-bool GripReach::start_detour_to(double set_N, const GripReadings &readings, const GripSettings &settings,
-                                double now_s) {
+bool GripReach::start_detour_to(double set_N, const GripReadings &readings, const GripSettings &settings, double now_s) {
   if (!can_detour(readings) || detours_ >= DETOURS_MOST || !rests(now_s, readings.t_s)) {
     return false;
   }
@@ -280,8 +263,7 @@ bool GripReach::start_detour_to(double set_N, const GripReadings &readings, cons
   const double to_mm = coming - std::copysign(traits_.step_mm, off);
   const double widest_mm = std::max(coming, to_mm) + least_mm();
   const bool stays_below_cap = off < 0.0 || travel_below_cap_mm(readings, settings, coming) > traits_.step_mm;
-  if (std::abs(off) < OFF || !stays_below_cap ||
-      rubber_.force_at(widest_mm, readings.low_N, width_mm) < KEEPS * set_N) {
+  if (std::abs(off) < OFF || !stays_below_cap || rubber_.force_at(widest_mm, readings.low_N, width_mm) < KEEPS * set_N) {
     return false;
   }
   detours_++;
@@ -324,8 +306,7 @@ void GripReach::learn(const GripReadings &readings, const GripSettings &settings
   if (come) {
     rubber_.learn(readings.grip_N, width_mm);
   }
-  // A gripper that limits its own force may be bounded from moves that overlap: the bound alone does
-  // not have to keep it below the cap.
+  // A gripper that limits its own force may be bounded from moves that overlap: the bound alone does not have to keep it below the cap.
   if (limits_itself(settings) ? come : rests(now_s, readings.t_s)) {
     if (readings.low_N > settings.touch_N && !readings.is_alone()) {
       bound_.learn(readings.grip_N, width_mm);
@@ -369,10 +350,9 @@ double GripReach::steps_to(const Outlook &outlook, double wanted_N) const {
 
 double GripReach::whole_steps(double mm) const { return traits_.step_mm * std::floor(mm / traits_.step_mm); }
 
-double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings,
-                            const GripSettings &settings, std::uint32_t &trouble) const {
-  const double steps =
-      aim.nearest ? outlook.nearest_steps : std::ceil(steps_to(outlook, aim.wanted_N - outlook.misses_N) - 1e-6);
+double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings, const GripSettings &settings,
+                            std::uint32_t &trouble) const {
+  const double steps = aim.nearest ? outlook.nearest_steps : std::ceil(steps_to(outlook, aim.wanted_N - outlook.misses_N) - 1e-6);
   double way_mm = traits_.step_mm * steps;
   if (aim.haste == Haste::patient) {
     way_mm = std::min(way_mm, whole_steps(SHORT_mm));
@@ -383,8 +363,7 @@ double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const Gr
   if (way_mm > below_cap_mm) {
     // A grip that is too weak gets a short move even then, if the gripper's own limit keeps it below the cap.
     const bool too_weak = !readings.is_alone() && (outlook.exact || outlook.coming_N < WEAK * aim.wanted_N);
-    const double short_mm =
-        too_weak && limits_itself(settings) ? std::max(outlook.least_mm, whole_steps(SHORT_mm)) : 0.0;
+    const double short_mm = too_weak && limits_itself(settings) ? std::max(outlook.least_mm, whole_steps(SHORT_mm)) : 0.0;
     way_mm = std::min(way_mm, std::max(whole_steps(below_cap_mm), short_mm));
     trouble |= GRIP_AT_CAP;
   }
@@ -406,8 +385,7 @@ double GripReach::opened_mm(const Outlook &outlook, const GripAim &aim) const {
   return way_mm >= least_mm - 1e-9 ? outlook.coming_mm + way_mm : outlook.coming_mm;
 }
 
-std::uint32_t GripReach::aim(const GripAim &aim, const GripReadings &readings, const GripSettings &settings,
-                             double now_s) {
+std::uint32_t GripReach::aim(const GripAim &aim, const GripReadings &readings, const GripSettings &settings, double now_s) {
   std::uint32_t trouble = 0;
   if (readings.fingers == 0 || !knows_width(readings.t_s, now_s)) {
     return trouble;
@@ -415,8 +393,7 @@ std::uint32_t GripReach::aim(const GripAim &aim, const GripReadings &readings, c
   learn(readings, settings, now_s);
   const bool patient = aim.haste == Haste::patient;
   // A gripper that cannot limit its own force moves only after the effect of its last move is measured.
-  const bool may_move =
-      limits_itself(settings) ? !patient || has_come(now_s, readings.t_s) : rests(now_s, readings.t_s);
+  const bool may_move = limits_itself(settings) ? !patient || has_come(now_s, readings.t_s) : rests(now_s, readings.t_s);
   if (!may_move) {
     return trouble;
   }

@@ -110,19 +110,16 @@ public:
   // The furthest whole step from the width last sent that keeps the larger of both forces below the cap.
   double last_below_cap_mm(const GripReadings &readings, const GripSettings &settings) const;
   // The nearest width within all caps.
-  double allowed(double width_mm, const GripReadings &readings, const GripSettings &settings,
-                 std::uint32_t &trouble) const;
+  double allowed(double width_mm, const GripReadings &readings, const GripSettings &settings, std::uint32_t &trouble) const;
 
-  // Whether the gripper's motion, as known and as commanded, makes one force of the other, both of a
-  // fingertip in a hold.
+  // Whether the gripper's motion, as known and as commanded, makes one force of the other, both of a fingertip in a hold.
   bool explains(double from_N, double from_s, double to_N, double to_s, const GripSettings &settings) const;
 
   // Sends the gripper to the width of the wanted force. Returns the caps that prevent it.
   std::uint32_t aim(const GripAim &aim, const GripReadings &readings, const GripSettings &settings, double now_s);
 
-  // Detour: a gripper whose least move is several steps moves by a single step in two moves, back and
-  // on again. Only while there is no load. Both return true if a detour begins.
-  // One step closer, if only the fingertips keep the cap and one step stays below it.
+  // Detour: a gripper whose least move is several steps moves by a single step in two moves, back and on again. Only while there is no
+  // load. Both return true if a detour begins. One step closer, if only the fingertips keep the cap and one step stays below it.
   bool start_detour_closer(const GripReadings &readings, const GripSettings &settings, double now_s);
   // One step in either direction, if that is nearer to this force. On the way the grip keeps a share of it.
   bool start_detour_to(double set_N, const GripReadings &readings, const GripSettings &settings, double now_s);
@@ -158,8 +155,8 @@ private:
   double steps_to(const Outlook &outlook, double wanted_N) const;
   double whole_steps(double mm) const; // rounded down, in mm
   // The widths to close and to open to. closed_mm reports a cap that shortens the move.
-  double closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings,
-                   const GripSettings &settings, std::uint32_t &trouble) const;
+  double closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings, const GripSettings &settings,
+                   std::uint32_t &trouble) const;
   double opened_mm(const Outlook &outlook, const GripAim &aim) const;
   // Whether the gripper's own force limit can be set as low as the cap.
   bool limits_itself(const GripSettings &settings) const;

@@ -10,8 +10,7 @@ namespace fingertip {
 
 enum GripMode : std::uint8_t { GRIP_MODE_FIXED, GRIP_MODE_HOLD };
 
-// The gains of eq. (6): dP = kp e + ki integral(e) + kd de/dt. dP closes the gripper from the width
-// at which both fingertips touched.
+// The gains of eq. (6): dP = kp e + ki integral(e) + kd de/dt. dP closes the gripper from the width at which both fingertips touched.
 struct GripGains {
   double kp_mm_N = 0.06, ki_mm_Ns = 1.0, kd_mm_s_N = 0.0;
 };
@@ -48,9 +47,7 @@ struct GripSettings {
   // Load of one fingertip by the expected mass.
   double expected_N(bool is_loaded) const { return 0.5 * mass_kg * (9.81 + (is_loaded ? 0.0 : lift_m_s2)); }
   // Grip before there is a load; grip if none can be estimated.
-  double first_N() const {
-    return mass_kg > 0.0 ? std::min(std::max(margin * expected_N(false) / friction, floor_N), cap_N) : start_N;
-  }
+  double first_N() const { return mass_kg > 0.0 ? std::min(std::max(margin * expected_N(false) / friction, floor_N), cap_N) : start_N; }
   double unseen_N() const { return std::max(blind_N, first_N()); }
   // A set force: the same grip at the start, later and without a load. While there is no load, the controller holds the
   // nearest force that the gripper reaches, not the least that is enough. Forces this far apart are alike.

@@ -7,8 +7,8 @@
 namespace fingertip {
 
 void check_move(const GripperMove &move) {
-  if (!std::isfinite(move.width_mm) || !std::isfinite(move.speed_mm_s) || !std::isfinite(move.force_N) ||
-      move.speed_mm_s < 0 || move.force_N < 0) {
+  if (!std::isfinite(move.width_mm) || !std::isfinite(move.speed_mm_s) || !std::isfinite(move.force_N) || move.speed_mm_s < 0 ||
+      move.force_N < 0) {
     throw Error(ErrorCode::bad_value, "a move needs numbers, and speed and force are not negative");
   }
 }
@@ -22,8 +22,7 @@ GripperWay complete(GripperWay way, const GripperUsual &usual) {
   way.open_count = way.open_count.value_or(usual.open_count);
   for (int count : {*way.closed_count, *way.open_count}) {
     if (count < 0 || count > usual.most_count || way.closed_count == way.open_count) {
-      throw Error(ErrorCode::bad_value,
-                  "counts of the ends are two numbers from 0 to " + std::to_string(usual.most_count));
+      throw Error(ErrorCode::bad_value, "counts of the ends are two numbers from 0 to " + std::to_string(usual.most_count));
     }
   }
   if (!(way.jaw_mm >= 10 && way.jaw_mm <= 500)) {
@@ -107,13 +106,11 @@ AskedLine::Bytes AskedLine::hear(const Bytes &question, std::size_t length) {
   if (noise + came.size() > 0) {
     throw Error(ErrorCode::gripper_garbled, way_.port + ": an answer is damaged (checksum)");
   }
-  throw Error(ErrorCode::gripper_silent, way_.port + ": no answer from slave " + std::to_string(way_.slave) +
-                                             " within " + std::to_string(std::lround(way_.timeout_s * 1000)) + " ms");
+  throw Error(ErrorCode::gripper_silent, way_.port + ": no answer from slave " + std::to_string(way_.slave) + " within " +
+                                             std::to_string(std::lround(way_.timeout_s * 1000)) + " ms");
 }
 
-std::chrono::microseconds AskedLine::timeout() const {
-  return std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6));
-}
+std::chrono::microseconds AskedLine::timeout() const { return std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6)); }
 
 std::string limited_by(const std::string &port, int exchanges) {
   const std::optional<int> timer_ms = latency_timer_ms(port);

@@ -76,11 +76,8 @@ constexpr double OFF_GOAL = 22;
 // Until a command shows in its flag.
 constexpr std::int64_t STARTING_us = 50'000;
 
-constexpr GripperUsual USUAL = {.slave = SLAVE,
-                                .most_slave = MOST_SLAVE,
-                                .closed_count = 2048,
-                                .open_count = 2048 + static_cast<int>(USUAL_OPEN),
-                                .most_count = 4095};
+constexpr GripperUsual USUAL = {
+    .slave = SLAVE, .most_slave = MOST_SLAVE, .closed_count = 2048, .open_count = 2048 + static_cast<int>(USUAL_OPEN), .most_count = 4095};
 
 constexpr std::uint8_t STATUS_FROM = TORQUE_ENABLE;
 
@@ -145,8 +142,7 @@ FeetechGripper::FeetechGripper(const GripperWay &given)
   poll();
 }
 
-AskedLine::Heard FeetechGripper::take(const Bytes &, std::size_t length, Bytes *came, std::size_t *noise,
-                                      Bytes *payload) {
+AskedLine::Heard FeetechGripper::take(const Bytes &, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) {
   const std::optional<Packet> answer = take_packet(came, noise);
   if (!answer) {
     return Heard::nothing;
@@ -164,9 +160,7 @@ Bytes FeetechGripper::question_of(std::uint8_t instruction, const Bytes &paramet
   return encoded({static_cast<std::uint8_t>(way_.slave), instruction, parameters});
 }
 
-Bytes FeetechGripper::read(std::uint8_t address, std::uint8_t length) {
-  return exchange(question_of(READ, {address, length}), length);
-}
+Bytes FeetechGripper::read(std::uint8_t address, std::uint8_t length) { return exchange(question_of(READ, {address, length}), length); }
 
 void FeetechGripper::write(std::uint8_t address, const Bytes &values) {
   Bytes parameters = {address};
@@ -182,17 +176,16 @@ GripperStatus FeetechGripper::poll() {
   const int position = word(table, at(PRESENT_POSITION));
   const double count = (position & SIGN) ? -magnitude(PRESENT_POSITION) : position;
   if (count < 0.0 || count >= COUNTS_PER_TURN) {
-    throw Error(ErrorCode::gripper_refused,
-                way_.port + ": position " + fixed(count, 0) + " is not one of 0 to " + fixed(COUNTS_PER_TURN - 1, 0) +
-                    ": the servo is a turn off, or in multi-turn mode; its width is unknown");
+    throw Error(ErrorCode::gripper_refused, way_.port + ": position " + fixed(count, 0) + " is not one of 0 to " +
+                                                fixed(COUNTS_PER_TURN - 1, 0) +
+                                                ": the servo is a turn off, or in multi-turn mode; its width is unknown");
   }
   GripperStatus status;
   status.host_us = (began_us + steady_now_us()) / 2;
   active_ = table[at(TORQUE_ENABLE)] != 0;
   status.active = active_;
   const double off = std::abs(count - magnitude(GOAL_POSITION));
-  status.moving =
-      active_ && (table[at(MOVING)] != 0 || (off > OFF_GOAL && status.host_us - commanded_us_ < STARTING_us));
+  status.moving = active_ && (table[at(MOVING)] != 0 || (off > OFF_GOAL && status.host_us - commanded_us_ < STARTING_us));
   if (active_ && !status.moving) {
     status.object = off > OFF_GOAL;
   }

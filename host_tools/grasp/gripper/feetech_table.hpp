@@ -1,9 +1,8 @@
 // The memory of Feetech's STS servos, as far as a gripper needs it, and their packets. Sources:
 // Feetech, "STS Magnetic Encoding Smart Servo Protocol Manual", and "SMS/STS memory table".
 //
-// Half-duplex serial, 1 Mbit/s, 8N1. A packet is FF FF, id, length (of the rest), instruction or
-// error bits, parameters, checksum (~ of the sum from id on). Values of two bytes have the low byte
-// first. Negative ones have a sign bit.
+// Half-duplex serial, 1 Mbit/s, 8N1. A packet is FF FF, id, length (of the rest), instruction or error bits, parameters, checksum (~ of the
+// sum from id on). Values of two bytes have the low byte first. Negative ones have a sign bit.
 #pragma once
 
 #include <cstddef>

@@ -49,8 +49,7 @@ struct GripperStatus {
   double width_mm = 0.0;
   double current_A = 0.0; // of its motor, as a number without sign
   std::uint8_t fault = 0; // the maker's code; 0: none
-  // The gripper got no question for a second or more before this exchange. No fault: a gripper that
-  // reports this goes on.
+  // The gripper got no question for a second or more before this exchange. No fault: a gripper that reports this goes on.
   bool was_left_alone = false;
 };
 

@@ -12,9 +12,7 @@ struct Model {
   std::unique_ptr<Gripper> (*open)(const GripperWay &way);
 };
 
-template <typename Driver> std::unique_ptr<Gripper> driven_by(const GripperWay &way) {
-  return std::make_unique<Driver>(way);
-}
+template <typename Driver> std::unique_ptr<Gripper> driven_by(const GripperWay &way) { return std::make_unique<Driver>(way); }
 
 struct Range {
   double low, high;

@@ -84,8 +84,7 @@ static GripperWay robotiq_way(const GripperWay &given) {
   return way;
 }
 
-RobotiqGripper::RobotiqGripper(const GripperWay &given)
-    : AskedLine(robotiq_way(given), BAUD), traits_(gripper_traits(given.model)) {
+RobotiqGripper::RobotiqGripper(const GripperWay &given) : AskedLine(robotiq_way(given), BAUD), traits_(gripper_traits(given.model)) {
   traits_.step_mm = traits_.stroke_mm / (*way_.closed_count - *way_.open_count);
   std::optional<Error> garbled;
   for (const int function : {4, 3}) {
@@ -104,8 +103,7 @@ RobotiqGripper::RobotiqGripper(const GripperWay &given)
   }
 }
 
-AskedLine::Heard RobotiqGripper::take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise,
-                                      Bytes *payload) {
+AskedLine::Heard RobotiqGripper::take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) {
   for (; came->size() > HEAD; came->erase(came->begin()), ++*noise) {
     const std::uint8_t function = (*came)[1];
     const bool known = function == 3 || function == 4 || function == WRITE_AND_READ;
@@ -125,8 +123,7 @@ AskedLine::Heard RobotiqGripper::take(const Bytes &question, std::size_t length,
       return Heard::other_slave;
     }
     if (function == (question[1] | EXCEPTION)) {
-      throw Error(ErrorCode::gripper_refused,
-                  way_.port + ": refused with Modbus exception " + std::to_string(frame[HEAD]));
+      throw Error(ErrorCode::gripper_refused, way_.port + ": refused with Modbus exception " + std::to_string(frame[HEAD]));
     }
     if (function != question[1] || size != HEAD + length + CRC) {
       return Heard::other_answer;
@@ -219,10 +216,9 @@ GripperStatus RobotiqGripper::move(const GripperMove &move) {
                     : move.width_mm >= traits_.stroke_mm
                         ? 0
                         : static_cast<int>(std::lround(*way_.closed_count - move.width_mm / traits_.step_mm));
-  const Registers command = {
-      rACT | rGTO, static_cast<std::uint16_t>(count),
-      static_cast<std::uint16_t>(share(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s) << 8 |
-                                 share(move.force_N, traits_.force_min_N, traits_.force_max_N))};
+  const Registers command = {rACT | rGTO, static_cast<std::uint16_t>(count),
+                             static_cast<std::uint16_t>(share(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s) << 8 |
+                                                        share(move.force_N, traits_.force_min_N, traits_.force_max_N))};
   if (!goes_) {
     const GripperStatus now = read_status();
     if (!active_) {
@@ -239,8 +235,7 @@ GripperStatus RobotiqGripper::move(const GripperMove &move) {
       put_range(&rest, STATUS_REGISTER, REGISTERS);
       put_range(&rest, COMMAND_REGISTER + 1, REGISTERS - 1);
       put_values(&rest, REGISTERS - 1, command.data() + 1);
-      const Registers registers =
-          registers_of(exchange(question_of(WRITE_AND_READ, rest), answer_length(REGISTERS)), REGISTERS);
+      const Registers registers = registers_of(exchange(question_of(WRITE_AND_READ, rest), answer_length(REGISTERS)), REGISTERS);
       both_worked_ = true;
       return status_of(registers);
     } catch (const Error &error) {
@@ -258,8 +253,8 @@ GripperStatus RobotiqGripper::move(const GripperMove &move) {
 }
 
 std::string RobotiqGripper::line() const {
-  std::string text = "Modbus RTU at " + std::to_string(BAUD) + " baud, slave " + std::to_string(way_.slave) +
-                     ", function " + (both_at_once_ ? "23" : "16 and " + std::to_string(read_function_));
+  std::string text = "Modbus RTU at " + std::to_string(BAUD) + " baud, slave " + std::to_string(way_.slave) + ", function " +
+                     (both_at_once_ ? "23" : "16 and " + std::to_string(read_function_));
   return text + limited_by(line_.path(), both_at_once_ ? 1 : 2);
 }
 

@@ -3,9 +3,8 @@
 // The driver finds out which functions a gripper answers. To read it tries 4, then 3, when it opens. To write and read
 // it tries 23, then 16 and a read, at the first moves, since only a command can show it.
 //
-// A move writes rPR, rSP and rFR alone. So a gripper that lost its power since the last answer
-// stays inactive. Writing rACT again would activate it and drop what it holds. rGTO is written with
-// them only if a status has just shown active without gGTO.
+// A move writes rPR, rSP and rFR alone. So a gripper that lost its power since the last answer stays inactive. Writing rACT again would
+// activate it and drop what it holds. rGTO is written with them only if a status has just shown active without gGTO.
 #pragma once
 
 #include "grasp/gripper/common.hpp"

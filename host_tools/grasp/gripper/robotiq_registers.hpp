@@ -1,10 +1,8 @@
-// The registers of Robotiq's two-finger grippers, alike for 2F-85, 2F-140 and Hand-E. Sources:
-// Robotiq, "2F-85 & 2F-140 Instruction Manual" and "Hand-E Gripper Instruction Manual", sections
-// Control (register mapping) and Modbus RTU communication.
+// The registers of Robotiq's two-finger grippers, alike for 2F-85, 2F-140 and Hand-E. Sources: Robotiq, "2F-85 & 2F-140 Instruction Manual"
+// and "Hand-E Gripper Instruction Manual", sections Control (register mapping) and Modbus RTU communication.
 //
-// Modbus RTU, 115200 baud, 8N1, slave 9. Functions: 16 and 23 write; 23 and 4 read, in older
-// manuals 3 instead of 4. There are no exception answers: the gripper does not answer what it does
-// not know. A register is two of the maker's bytes, the first in the high half.
+// Modbus RTU, 115200 baud, 8N1, slave 9. Functions: 16 and 23 write; 23 and 4 read, in older manuals 3 instead of 4. There are no exception
+// answers: the gripper does not answer what it does not know. A register is two of the maker's bytes, the first in the high half.
 #pragma once
 
 #include <cstdint>

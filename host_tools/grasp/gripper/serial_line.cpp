@@ -35,8 +35,7 @@ SerialLine::SerialLine(const std::string &path, unsigned baud) : path_(path), tr
   const bool is_simulated = fstat(fd, &status) == 0 && S_ISSOCK(status.st_mode);
   if (is_simulated) {
     speed_of(baud); // which a socket does not have
-  } else if (tcgetattr(fd, &settings) != 0 || cfsetspeed(&settings, speed_of(baud)) != 0 ||
-             tcsetattr(fd, TCSANOW, &settings) != 0) {
+  } else if (tcgetattr(fd, &settings) != 0 || cfsetspeed(&settings, speed_of(baud)) != 0 || tcsetattr(fd, TCSANOW, &settings) != 0) {
     throw Error(ErrorCode::cannot_open, path + ": cannot go at " + std::to_string(baud) + " baud");
   }
   drop_input();

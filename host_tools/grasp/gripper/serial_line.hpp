@@ -11,8 +11,7 @@ namespace fingertip {
 
 class SerialLine {
 public:
-  // 8N1, held exclusively. Throws Error: the port is absent, in use, not allowed, no serial port,
-  // or does not go that fast.
+  // 8N1, held exclusively. Throws Error: the port is absent, in use, not allowed, no serial port, or does not go that fast.
   SerialLine(const std::string &path, unsigned baud);
 
   SerialTransport &transport() { return transport_; }

@@ -4,11 +4,10 @@
  *   pollfd port = {fd, POLLIN, 0};
  *   if (wait_for(&port, 1, limit) > 0) ...
  *
- * Nothing else in the host programs calls steady_clock::now, poll with a timeout, a sleep or a timed wait of a
- * condition variable. So another implementation of this header, chosen by the linker, is all that a test needs to run
- * whole programs on simulated time (tests/support/simulated_clock.cpp). Under such a clock one thread runs at a time,
- * and time passes only while all of them wait here: never wait while holding a lock that another thread needs before it
- * waits itself. */
+ * Nothing else in the host programs calls steady_clock::now, poll with a timeout, a sleep or a timed wait of a condition variable. So
+ * another implementation of this header, chosen by the linker, is all that a test needs to run whole programs on simulated time
+ * (tests/support/simulated_clock.cpp). Under such a clock one thread runs at a time, and time passes only while all of them wait here:
+ * never wait while holding a lock that another thread needs before it waits itself. */
 #pragma once
 
 #include <chrono>
@@ -32,9 +31,8 @@ std::int64_t steady_now_us();
 /* The time of day, for people: it may jump. */
 std::chrono::system_clock::time_point wall_now();
 
-/* Like poll(2), but until a moment instead of for a duration, exact to the microsecond. Returns the
- * number of descriptors that are ready; 0 once `until` has come or after a signal. A moment that has
- * passed only asks. HostTime::max() waits without end. */
+/* Like poll(2), but until a moment instead of for a duration, exact to the microsecond. Returns the number of descriptors that are ready; 0
+ * once `until` has come or after a signal. A moment that has passed only asks. HostTime::max() waits without end. */
 int wait_for(pollfd *descriptors, std::size_t count, HostTime until);
 /* A signal ends the wait early. */
 void wait_until(HostTime until);

@@ -8,9 +8,7 @@
 
 namespace fingertip {
 
-std::int64_t steady_now_us() {
-  return std::chrono::duration_cast<std::chrono::microseconds>(host_now().time_since_epoch()).count();
-}
+std::int64_t steady_now_us() { return std::chrono::duration_cast<std::chrono::microseconds>(host_now().time_since_epoch()).count(); }
 
 void wait_until(HostTime until) { wait_for(nullptr, 0, until); }
 

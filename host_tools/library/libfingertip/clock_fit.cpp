@@ -67,8 +67,7 @@ std::optional<ClockEstimate> ClockFit::fit() const {
   }
   double slowest = edge(widest, -SLOPE_LIMIT, gap);
   double fastest = edge(widest, SLOPE_LIMIT, gap);
-  double slope =
-      highest(slowest, fastest, [&](double candidate) { return gap(candidate) - DRIFT_COST_us * std::abs(candidate); });
+  double slope = highest(slowest, fastest, [&](double candidate) { return gap(candidate) - DRIFT_COST_us * std::abs(candidate); });
   double middle = (limit(slope, true) + limit(slope, false)) / 2;
   double latest = limit(highest(slowest, fastest, [&](double s) { return limit(s, true); }), true);
   double earliest = limit(highest(slowest, fastest, [&](double s) { return -limit(s, false); }), false);
@@ -81,21 +80,18 @@ std::optional<ClockEstimate> ClockFit::fit() const {
 }
 
 void ClockFit::add(const ClockExchange &exchange) {
-  if (exchange.received_us < exchange.sent_us ||
-      (!exchanges_.empty() && exchange.device_us < exchanges_.back().device_us)) {
+  if (exchange.received_us < exchange.sent_us || (!exchanges_.empty() && exchange.device_us < exchanges_.back().device_us)) {
     return;
   }
   exchanges_.push_back(exchange);
-  while (exchanges_.size() > EXCHANGES ||
-         static_cast<double>(exchange.device_us - exchanges_.front().device_us) > WINDOW_us) {
+  while (exchanges_.size() > EXCHANGES || static_cast<double>(exchange.device_us - exchanges_.front().device_us) > WINDOW_us) {
     exchanges_.pop_front();
   }
   estimate_ = fit();
   if (!estimate_) {
     jumps_++;
     while (!estimate_) {
-      exchanges_.erase(exchanges_.begin(),
-                       exchanges_.begin() + static_cast<std::ptrdiff_t>((exchanges_.size() + 1) / 2));
+      exchanges_.erase(exchanges_.begin(), exchanges_.begin() + static_cast<std::ptrdiff_t>((exchanges_.size() + 1) / 2));
       if (exchanges_.empty()) {
         exchanges_.push_back(exchange);
       }

@@ -1,11 +1,10 @@
 /* A fingertip's clock in terms of the host's, from commands and their acknowledgements.
  *
- * An exchange shows that the host's clock was between sent and received when the fingertip's was at device_us. A
- * straight line, offset and drift, must pass between all of these of the last half minute. The distance between the
- * possible lines at one time bounds the error, whatever the delays were. The estimate is the line in the middle, as far
- * from the nearest limits on both sides as it can be. Slow exchanges do not touch it. It is exact where the fastest
- * command and the fastest answer took equally long. If no line passes, the clock has jumped, and the older half of the
- * exchanges is dropped. */
+ * An exchange shows that the host's clock was between sent and received when the fingertip's was at device_us. A straight line, offset and
+ * drift, must pass between all of these of the last half minute. The distance between the possible lines at one time bounds the error,
+ * whatever the delays were. The estimate is the line in the middle, as far from the nearest limits on both sides as it can be. Slow
+ * exchanges do not touch it. It is exact where the fastest command and the fastest answer took equally long. If no line passes, the clock
+ * has jumped, and the older half of the exchanges is dropped. */
 #pragma once
 
 #include <cstdint>

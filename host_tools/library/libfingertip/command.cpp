@@ -39,9 +39,7 @@ static std::string value_text(const SettingValue &value, double number) {
   if (const char *word = word_of(value, number)) {
     return word;
   }
-  return value.per > 1 ? fixed(number / value.per, 3)
-         : value.whole ? fixed(number, 0)
-                       : shortest(static_cast<float>(number));
+  return value.per > 1 ? fixed(number / value.per, 3) : value.whole ? fixed(number, 0) : shortest(static_cast<float>(number));
 }
 
 static bool is_possible(const SettingValue &value, double number) {
@@ -110,8 +108,7 @@ static SettingValues values_from_text(const Setting &setting, const std::string 
     if (!number) {
       throw Error(ErrorCode::bad_value,
                   spoken(setting) + " \"" + text + "\" is " +
-                      (value.words ? "unknown"
-                                   : std::string("no ") + (value.whole && value.per == 1 ? "whole " : "") + "number") +
+                      (value.words ? "unknown" : std::string("no ") + (value.whole && value.per == 1 ? "whole " : "") + "number") +
                       "; give " + setting.give);
     }
     values[i] = *number;
@@ -187,11 +184,9 @@ wire_packet command_erase_pad() { return packet_of(WIRE_CMD_ERASE_PAD); }
 
 WantedSetting setting_from_text(const std::string &text) {
   const std::size_t equals = text.find('=');
-  const Setting *setting =
-      find_in(all_settings, [&](const Setting &each) { return text.substr(0, equals) == each.name; });
+  const Setting *setting = find_in(all_settings, [&](const Setting &each) { return text.substr(0, equals) == each.name; });
   if (!setting) {
-    std::string known =
-        joined(all_settings, ", ", [](const Setting &each) { return std::string(each.name) + "=" + each.typed; });
+    std::string known = joined(all_settings, ", ", [](const Setting &each) { return std::string(each.name) + "=" + each.typed; });
     known.replace(known.rfind(", "), 2, " or ");
     throw Error("setting \"" + text + "\" is unknown; give " + known);
   }

@@ -47,8 +47,7 @@ std::string settings_help();
 /* The bytes of a packet on the line, delimiter included. */
 std::vector<std::uint8_t> frame_bytes(const wire_packet &packet);
 
-/* The info command in another version of the protocol, delimiter included: a fingertip that speaks
- * that version answers. */
+/* The info command in another version of the protocol, delimiter included: a fingertip that speaks that version answers. */
 std::vector<std::uint8_t> info_frame_of_version(std::uint8_t version);
 
 } // namespace fingertip

@@ -59,8 +59,7 @@ static Way only_one(const std::vector<Found> &found, Reach reach, const std::str
   }
   if (found.size() > 1) {
     throw Error(ErrorCode::several_fingertips,
-                "several fingertips found: " +
-                    joined(found, ", ", [&](const Found &each) { return name_of(each, reach, root); }));
+                "several fingertips found: " + joined(found, ", ", [&](const Found &each) { return name_of(each, reach, root); }));
   }
   return sure_way_to(found[0], reach);
 }
@@ -159,8 +158,7 @@ Way choose_way(const Choice &wanted, const std::string &root) {
     if (!choice.device.empty()) {
       way.serial = serial_of(way, root);
       if (!is_same_serial(way.serial, choice.device)) {
-        throw Error(ErrorCode::other_fingertip,
-                    choice.port + ": is fingertip " + way.serial + ", not " + choice.device);
+        throw Error(ErrorCode::other_fingertip, choice.port + ": is fingertip " + way.serial + ", not " + choice.device);
       }
     }
     return way;
@@ -172,8 +170,7 @@ Way choose_way(const Choice &wanted, const std::string &root) {
   if (!finds.in_environment.empty() && choice.reach != Reach::usb) {
     return only_one(finds.in_environment, choice.reach, root, "");
   }
-  return only_one(finds.here, choice.reach, root,
-                  choice.reach == Reach::usb ? "no fingertip found by libusb" : "no fingertip found");
+  return only_one(finds.here, choice.reach, root, choice.reach == Reach::usb ? "no fingertip found by libusb" : "no fingertip found");
 }
 
 std::vector<Way> all_ways(Reach reach, const std::string &root) {

@@ -42,9 +42,8 @@ struct Finds {
 };
 Finds find_fingertips(const std::string &root = "/");
 
-/* Throws Error if there is none, several to choose from, or another one than was wanted. If a
- * serial number is wanted and USB does not report that of a port, the fingertip there is asked for
- * it. Without options the environment goes before USB. */
+/* Throws Error if there is none, several to choose from, or another one than was wanted. If a serial number is wanted and USB does not
+ * report that of a port, the fingertip there is asked for it. Without options the environment goes before USB. */
 Way choose_way(const Choice &choice, const std::string &root = "/");
 
 /* All there are, for programs that take several; the environment's too, each asked who it is. */

@@ -4,14 +4,13 @@
 
 namespace fingertip {
 
-const std::array<LineStatistics::Named, 7> LineStatistics::counts = {
-    {{"packets", &LineStatistics::packets},
-     {"dropped_packets", &LineStatistics::dropped_packets},
-     {"out_of_order", &LineStatistics::out_of_order},
-     {"crc_errors", &LineStatistics::crc_errors},
-     {"format_errors", &LineStatistics::format_errors},
-     {"version_errors", &LineStatistics::version_errors},
-     {"unknown_types", &LineStatistics::unknown_types}}};
+const std::array<LineStatistics::Named, 7> LineStatistics::counts = {{{"packets", &LineStatistics::packets},
+                                                                      {"dropped_packets", &LineStatistics::dropped_packets},
+                                                                      {"out_of_order", &LineStatistics::out_of_order},
+                                                                      {"crc_errors", &LineStatistics::crc_errors},
+                                                                      {"format_errors", &LineStatistics::format_errors},
+                                                                      {"version_errors", &LineStatistics::version_errors},
+                                                                      {"unknown_types", &LineStatistics::unknown_types}}};
 
 std::string LineStatistics::text() const {
   return joined(counts, " ", [&](const Named &each) { return each.name + ("=" + std::to_string(this->*each.count)); });
@@ -74,8 +73,7 @@ void Decoder::feed(const std::uint8_t *bytes, std::size_t length, const Handler 
       joining_ = false;
     }
     switch (status) {
-    case FT_PENDING:
-      break;
+    case FT_PENDING: break;
     case FT_OK:
       statistics_.packets++;
       sequence_.follow(packet.sequence, statistics_);
@@ -89,12 +87,8 @@ void Decoder::feed(const std::uint8_t *bytes, std::size_t length, const Handler 
       statistics_.version_errors++;
       other_version_ = receiver_.frame[0]; /* the packet was decoded in place */
       break;
-    case FT_ERR_CRC:
-      statistics_.crc_errors += torn_by_joining ? 0 : 1;
-      break;
-    default:
-      statistics_.format_errors += torn_by_joining ? 0 : 1;
-      break;
+    case FT_ERR_CRC: statistics_.crc_errors += torn_by_joining ? 0 : 1; break;
+    default: statistics_.format_errors += torn_by_joining ? 0 : 1; break;
     }
   }
 }

@@ -21,8 +21,7 @@ public:
   DescriptorTransport(const DescriptorTransport &) = delete;
   DescriptorTransport &operator=(const DescriptorTransport &) = delete;
 
-  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
-              std::chrono::milliseconds timeout) override;
+  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length, std::chrono::milliseconds timeout) override;
   bool write(const std::uint8_t *bytes, std::size_t length) override;
   std::string description() const override { return path_; }
   std::vector<pollfd> poll_descriptors() const override;

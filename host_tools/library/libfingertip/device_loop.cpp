@@ -16,8 +16,7 @@ using Kind = DeviceNews::Kind;
 
 constexpr milliseconds POLL{20};
 constexpr milliseconds REOPEN_INTERVAL{200};
-/* Without a frame for this time the streams are requested again: the device may have restarted
- * without the port noticing. */
+/* Without a frame for this time the streams are requested again: the device may have restarted without the port noticing. */
 constexpr milliseconds REVIVE_AFTER{3000};
 /* Exchanges before the streams begin, when nothing delays them; then one this often. */
 constexpr int FIRST_EXCHANGES = 32;
@@ -153,8 +152,7 @@ void DeviceLoop::greet(bool again) {
   fit_ = ClockFit();
   wire_packet info = session_.info();
   if (again && std::memcmp(info.body.info.serial, info_->serial, WIRE_TEXT_BYTES) != 0) {
-    throw Error(ErrorCode::other_fingertip, name() + ": another fingertip came back there; it had " +
-                                                text_field(info_->serial) + ", now " +
+    throw Error(ErrorCode::other_fingertip, name() + ": another fingertip came back there; it had " + text_field(info_->serial) + ", now " +
                                                 text_field(info.body.info.serial));
   }
   fit_ = ClockFit(); /* the first answers may have waited for the device to start */
@@ -200,8 +198,7 @@ void DeviceLoop::follow() {
     send_wanted();
     /* Repeating the wish is an exchange, and wakes a device that restarted unnoticed. */
     auto now = host_now();
-    if (options_.follow_clock ? now - asked_ >= EXCHANGE_INTERVAL
-                              : now - std::max(asked_, last_frame_) > REVIVE_AFTER) {
+    if (options_.follow_clock ? now - asked_ >= EXCHANGE_INTERVAL : now - std::max(asked_, last_frame_) > REVIVE_AFTER) {
       session_.send(command_stream(streams_));
       asked_ = now;
     }

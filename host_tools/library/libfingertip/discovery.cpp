@@ -67,8 +67,7 @@ bool is_device(const fs::path &usb, unsigned vendor, unsigned product) {
 std::string find_boot_rom(const std::string &root) {
   std::error_code none;
   for (const auto &entry : fs::directory_iterator(fs::path(root) / "sys/bus/usb/devices", none)) {
-    const BootRom *rom =
-        find_in(BOOT_ROMS, [&](const BootRom &each) { return is_device(entry.path(), each.vendor, each.product); });
+    const BootRom *rom = find_in(BOOT_ROMS, [&](const BootRom &each) { return is_device(entry.path(), each.vendor, each.product); });
     if (rom) {
       return rom->what;
     }
@@ -85,8 +84,8 @@ std::vector<Found> find_usb(const std::string &root) {
       continue;
     }
     auto number = [&](const char *name) { return static_cast<unsigned>(to_u64(file_text(usb / name)).value_or(0)); };
-    found.push_back({file_text(usb / "serial"), file_text(usb / "product"), port_of(usb, root),
-                     UsbPlace{number("busnum"), number("devnum")}});
+    found.push_back(
+        {file_text(usb / "serial"), file_text(usb / "product"), port_of(usb, root), UsbPlace{number("busnum"), number("devnum")}});
   }
   std::sort(found.begin(), found.end(), [](const Found &a, const Found &b) { return a.serial < b.serial; });
   return found;
@@ -98,10 +97,7 @@ std::vector<Found> find_in_environment() {
   for (std::string_view path : split(paths ? paths : "", ':')) {
     if (!path.empty()) {
       std::error_code none;
-      found.push_back({"",
-                       fs::exists(path, none) ? "from FINGERTIP_PORT" : "from FINGERTIP_PORT, no such port",
-                       std::string(path),
-                       {}});
+      found.push_back({"", fs::exists(path, none) ? "from FINGERTIP_PORT" : "from FINGERTIP_PORT, no such port", std::string(path), {}});
     }
   }
   return found;
@@ -109,8 +105,7 @@ std::vector<Found> find_in_environment() {
 
 std::string stable_port(const std::string &path, const std::string &root) {
   std::error_code none;
-  return fs::exists(path, none) && fs::path(path).parent_path() == fs::path(root) / "dev" ? stable_path(path, root)
-                                                                                          : path;
+  return fs::exists(path, none) && fs::path(path).parent_path() == fs::path(root) / "dev" ? stable_path(path, root) : path;
 }
 
 } // namespace fingertip

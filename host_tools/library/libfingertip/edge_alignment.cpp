@@ -124,8 +124,7 @@ std::optional<EdgeAlignment::Place> EdgeAlignment::place(std::size_t device, std
   };
   const auto at_us = static_cast<double>(t_us);
   if (reference_ == device) {
-    return std::any_of(members_.begin(), members_.end(), is_tied) ? std::optional(Place{to_host(at_us), 0})
-                                                                  : std::nullopt;
+    return std::any_of(members_.begin(), members_.end(), is_tied) ? std::optional(Place{to_host(at_us), 0}) : std::nullopt;
   }
   const Member &member = members_[device];
   if (!is_tied(member) || !member.clock) {

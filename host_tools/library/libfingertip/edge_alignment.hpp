@@ -1,9 +1,8 @@
 /* Several fingertips on one clock, by edges that they stamp on one wire.
  *
- * The recorder knows each fingertip's clock to some ten or hundred microseconds (clock_fit.hpp). An
- * edge that two of them have stamped ties their clocks to a microsecond. Two stamps are of one edge
- * if both rise or both fall, and the recorder places them as near as it must, and no others. So
- * edges are no help that follow one another faster than the recorder can distinguish.
+ * The recorder knows each fingertip's clock to some ten or hundred microseconds (clock_fit.hpp). An edge that two of them have stamped ties
+ * their clocks to a microsecond. Two stamps are of one edge if both rise or both fall, and the recorder places them as near as it must, and
+ * no others. So edges are no help that follow one another faster than the recorder can distinguish.
  *
  * One fingertip is the reference. Its time goes to the recorder's clock along a line with knots, a second apart, each
  * set by the estimate of the moment, ahead of the rows. So a time of the reference has one place, whenever a row with

@@ -1,6 +1,5 @@
-/* Errors that a user can correct, as facts: a code for programs, and a line for people that states
- * what is wrong. The program adds what to do about it, since it knows its own options and its user's
- * rights. Any other exception is a bug of ours. */
+/* Errors that a user can correct, as facts: a code for programs, and a line for people that states what is wrong. The program adds what to
+ * do about it, since it knows its own options and its user's rights. Any other exception is a bug of ours. */
 #pragma once
 
 #include <stdexcept>
@@ -74,9 +73,7 @@ class Error : public std::runtime_error {
 public:
   /* Of facts longer than 600 characters, which quote what may be as long as a file, the middle is left out. */
   Error(ErrorCode code, const std::string &facts)
-      : std::runtime_error(facts.size() <= 600 ? facts
-                                               : facts.substr(0, 300) + " ... " + facts.substr(facts.size() - 300)),
-        code_(code) {}
+      : std::runtime_error(facts.size() <= 600 ? facts : facts.substr(0, 300) + " ... " + facts.substr(facts.size() - 300)), code_(code) {}
   /* A text that is complete. */
   explicit Error(const std::string &text) : Error(ErrorCode::other, text) {}
 

@@ -49,20 +49,13 @@ static const Packet *find(std::uint8_t type) {
 /* Calls with a number of the kind's type. */
 template <typename Visitor> static void visit_kind(Kind kind, const Visitor &visit) {
   switch (kind) {
-  case Kind::u16:
-    return visit(std::uint16_t{});
-  case Kind::i16:
-    return visit(std::int16_t{});
-  case Kind::u32:
-    return visit(std::uint32_t{});
-  case Kind::i32:
-    return visit(std::int32_t{});
-  case Kind::u64:
-    return visit(std::uint64_t{});
-  case Kind::f32:
-    return visit(float{});
-  default:
-    return visit(std::uint8_t{});
+  case Kind::u16: return visit(std::uint16_t{});
+  case Kind::i16: return visit(std::int16_t{});
+  case Kind::u32: return visit(std::uint32_t{});
+  case Kind::i32: return visit(std::int32_t{});
+  case Kind::u64: return visit(std::uint64_t{});
+  case Kind::f32: return visit(float{});
+  default: return visit(std::uint8_t{});
   }
 }
 
@@ -81,8 +74,7 @@ static void store(const Field &field, double value, std::uint8_t *to) {
     if constexpr (std::is_integral_v<Number>) {
       /* The next number above the largest, which a double has exactly. */
       const double above = std::ldexp(1.0, std::numeric_limits<Number>::digits);
-      if (!(value >= static_cast<double>(std::numeric_limits<Number>::min()) && value < above) ||
-          value != std::floor(value)) {
+      if (!(value >= static_cast<double>(std::numeric_limits<Number>::min()) && value < above) || value != std::floor(value)) {
         throw Error(ErrorCode::bad_value, std::string(field.name) + " is out of range");
       }
     }
@@ -106,9 +98,8 @@ std::size_t count_of(std::uint8_t type) {
 wire_packet packet_of(std::uint8_t type, const double *values, std::size_t count) {
   const Packet *known = find(type);
   if (!known || count != count_of(type)) {
-    throw Error(ErrorCode::wrong_choice, known ? "a packet of type " + std::to_string(type) + " has " +
-                                                     std::to_string(count_of(type)) + " numbers, not " +
-                                                     std::to_string(count)
+    throw Error(ErrorCode::wrong_choice, known ? "a packet of type " + std::to_string(type) + " has " + std::to_string(count_of(type)) +
+                                                     " numbers, not " + std::to_string(count)
                                                : "there is no packet of type " + std::to_string(type));
   }
   wire_packet packet;
@@ -164,16 +155,11 @@ fingertip_status failed(fingertip_status status, const std::string &text) {
 
 fingertip_status failed(const Error &error) {
   constexpr std::pair<ErrorCode, fingertip_status> STATUSES[] = {
-      {ErrorCode::wrong_choice, FINGERTIP_ERR_ARGUMENT},
-      {ErrorCode::bad_value, FINGERTIP_ERR_VALUE},
-      {ErrorCode::not_a_recording, FINGERTIP_ERR_NOT_A_RECORDING},
-      {ErrorCode::other_format, FINGERTIP_ERR_OTHER_FORMAT},
-      {ErrorCode::unread_kind, FINGERTIP_ERR_NOT_A_RECORDING},
-      {ErrorCode::damaged_line, FINGERTIP_ERR_DAMAGED_LINE},
-      {ErrorCode::damaged_head, FINGERTIP_ERR_DAMAGED_HEAD},
-      {ErrorCode::other_sensor_count, FINGERTIP_ERR_SENSORS},
-      {ErrorCode::not_firmware, FINGERTIP_ERR_FIRMWARE},
-      {ErrorCode::other_chip, FINGERTIP_ERR_FIRMWARE},
+      {ErrorCode::wrong_choice, FINGERTIP_ERR_ARGUMENT},           {ErrorCode::bad_value, FINGERTIP_ERR_VALUE},
+      {ErrorCode::not_a_recording, FINGERTIP_ERR_NOT_A_RECORDING}, {ErrorCode::other_format, FINGERTIP_ERR_OTHER_FORMAT},
+      {ErrorCode::unread_kind, FINGERTIP_ERR_NOT_A_RECORDING},     {ErrorCode::damaged_line, FINGERTIP_ERR_DAMAGED_LINE},
+      {ErrorCode::damaged_head, FINGERTIP_ERR_DAMAGED_HEAD},       {ErrorCode::other_sensor_count, FINGERTIP_ERR_SENSORS},
+      {ErrorCode::not_firmware, FINGERTIP_ERR_FIRMWARE},           {ErrorCode::other_chip, FINGERTIP_ERR_FIRMWARE},
       {ErrorCode::damaged_firmware, FINGERTIP_ERR_FIRMWARE}};
   const auto *found = find_in(STATUSES, [&](const auto &each) { return each.first == error.code(); });
   return failed(found ? found->second : FINGERTIP_ERR_OTHER, error.what());
@@ -221,8 +207,7 @@ enum fingertip_status fingertip_field_of(uint8_t type, size_t index, struct fing
 
 size_t fingertip_value_count(uint8_t type) { return count_of(type); }
 
-enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count, uint8_t *frame, size_t size,
-                                       size_t *length) {
+enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count, uint8_t *frame, size_t size, size_t *length) {
   return guarded([&] {
     if (!values || !frame || !length) {
       return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL");
@@ -260,8 +245,8 @@ struct fingertip_decoder *fingertip_decoder_new(void) {
 
 void fingertip_decoder_free(struct fingertip_decoder *decoder) { delete decoder; }
 
-size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes, size_t length, double *values,
-                              size_t size, size_t *filled) {
+size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes, size_t length, double *values, size_t size,
+                              size_t *filled) {
   if (filled) {
     *filled = 0;
   }
@@ -272,8 +257,7 @@ size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *
   std::size_t taken = 0, used = 0;
   while (taken < length && size - used > FINGERTIP_VALUES_MOST) {
     const void *zero = std::memchr(bytes + taken, 0, length - taken);
-    const std::size_t end =
-        zero ? static_cast<std::size_t>(static_cast<const std::uint8_t *>(zero) - bytes) + 1 : length;
+    const std::size_t end = zero ? static_cast<std::size_t>(static_cast<const std::uint8_t *>(zero) - bytes) + 1 : length;
     decoder->decoder.feed(bytes + taken, end - taken, [&](const wire_packet &packet) {
       values[used++] = packet.type;
       put(packet, values + used);
@@ -291,9 +275,7 @@ void fingertip_decoder_counts(const struct fingertip_decoder *decoder, double co
   put(decoder->decoder.statistics(), counts);
 }
 
-uint8_t fingertip_decoder_other_version(const struct fingertip_decoder *decoder) {
-  return decoder->decoder.other_version();
-}
+uint8_t fingertip_decoder_other_version(const struct fingertip_decoder *decoder) { return decoder->decoder.other_version(); }
 
 struct fingertip_clock *fingertip_clock_new(void) {
   return new (std::nothrow) fingertip_clock;
@@ -312,8 +294,7 @@ enum fingertip_status fingertip_clock_estimate(const struct fingertip_clock *clo
   if (!found) {
     return FINGERTIP_END;
   }
-  const double numbers[4] = {static_cast<double>(found->device_us), found->host_us, found->drift_ppm,
-                             found->uncertainty_us};
+  const double numbers[4] = {static_cast<double>(found->device_us), found->host_us, found->drift_ppm, found->uncertainty_us};
   std::copy(std::begin(numbers), std::end(numbers), estimate);
   return FINGERTIP_OK;
 }
@@ -338,21 +319,15 @@ const char *fingertip_flag(size_t index, uint32_t *bit, int *is_warning) {
 
 size_t fingertip_flags_text(uint32_t flags, char *text, size_t size) { return put_text(flags_text(flags), text, size); }
 
-size_t fingertip_command_name(uint8_t type, char *text, size_t size) {
-  return put_text(command_name(type), text, size);
-}
+size_t fingertip_command_name(uint8_t type, char *text, size_t size) { return put_text(command_name(type), text, size); }
 
-size_t fingertip_result_text(uint8_t result, char *text, size_t size) {
-  return put_text(result_text(result), text, size);
-}
+size_t fingertip_result_text(uint8_t result, char *text, size_t size) { return put_text(result_text(result), text, size); }
 
 size_t fingertip_capabilities_text(uint32_t capabilities, char *text, size_t size) {
   return put_text(capabilities_text(capabilities), text, size);
 }
 
-size_t fingertip_stored_text(uint32_t stored, char *text, size_t size) {
-  return put_text(stored_text(stored), text, size);
-}
+size_t fingertip_stored_text(uint32_t stored, char *text, size_t size) { return put_text(stored_text(stored), text, size); }
 
 size_t fingertip_columns(uint8_t sensor_count, char *text, size_t size) {
   return put_text(recording::header_text(std::min<std::uint8_t>(sensor_count, FT_MAX_SENSORS)), text, size);
@@ -360,8 +335,8 @@ size_t fingertip_columns(uint8_t sensor_count, char *text, size_t size) {
 
 size_t fingertip_number_text(float value, char *text, size_t size) { return put_text(shortest(value), text, size); }
 
-enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length, char *board,
-                                         char *version, char *git_hash, size_t size) {
+enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length, char *board, char *version, char *git_hash,
+                                         size_t size) {
   return guarded([&] {
     if (!bytes && length > 0) {
       return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL");

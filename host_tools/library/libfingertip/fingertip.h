@@ -11,13 +11,12 @@
  * Errors. No C++ exception leaves the library. A function that can fail returns a status, negative
  * for failure. fingertip_error then has one line about it. Outputs are written on success only.
  *
- * Numbers. A packet is an array of doubles in the order of its fields. fingertip_field_of gives the order. The first
- * two numbers are in every packet: sequence, which counts the packets of a sender modulo 65536, and t_us, microseconds
- * on its clock since its start. A double holds every number of a packet exactly, a count of microseconds up to 2^53,
- * which is 285 years. A text is the codes of 16 characters, zeros behind. Fields with an element for each sensor have
- * FINGERTIP_SENSORS_MOST elements. The first sensor_count of them are of sensors. A field whose flag is off is 0.
- * PROTOCOL.md explains the fields. Their names end with their units: mm, N, Pa, us; q10 are 1/1024, cC 1/100 of a
- * degree Celsius. */
+ * Numbers. A packet is an array of doubles in the order of its fields. fingertip_field_of gives the order. The first two numbers are in
+ * every packet: sequence, which counts the packets of a sender modulo 65536, and t_us, microseconds on its clock since its start. A double
+ * holds every number of a packet exactly, a count of microseconds up to 2^53, which is 285 years. A text is the codes of 16 characters,
+ * zeros behind. Fields with an element for each sensor have FINGERTIP_SENSORS_MOST elements. The first sensor_count of them are of sensors.
+ * A field whose flag is off is 0. PROTOCOL.md explains the fields. Their names end with their units: mm, N, Pa, us; q10 are 1/1024, cC
+ * 1/100 of a degree Celsius. */
 #ifndef LIBFINGERTIP_FINGERTIP_H
 #define LIBFINGERTIP_FINGERTIP_H
 
@@ -75,8 +74,7 @@ size_t fingertip_value_count(uint8_t type);
 
 /* The frame of a packet or a command as it goes onto the line, final zero included. count: of values,
  * fingertip_value_count. FINGERTIP_ERR_VALUE names the field. */
-enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count, uint8_t *frame, size_t size,
-                                       size_t *length);
+enum fingertip_status fingertip_encode(uint8_t type, const double *values, size_t count, uint8_t *frame, size_t size, size_t *length);
 /* The command info in another version of the protocol: a fingertip that speaks that version answers. */
 enum fingertip_status fingertip_encode_info_of(uint8_t version, uint8_t *frame, size_t size, size_t *length);
 
@@ -103,8 +101,8 @@ void fingertip_decoder_free(struct fingertip_decoder *decoder);
  * how many bytes were taken; fewer than length where values is full: use what is there, and call again with the rest.
  * size: 1 + FINGERTIP_VALUES_MOST at least, else none is taken. A receiver that joins gets only the end of the first
  * frame, which counts as nothing. */
-size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes, size_t length, double *values,
-                              size_t size, size_t *filled);
+size_t fingertip_decoder_feed(struct fingertip_decoder *decoder, const uint8_t *bytes, size_t length, double *values, size_t size,
+                              size_t *filled);
 /* The line was interrupted: join again, and expect no particular sequence number. */
 void fingertip_decoder_restart(struct fingertip_decoder *decoder);
 void fingertip_decoder_counts(const struct fingertip_decoder *decoder, double counts[FINGERTIP_COUNTS]);
@@ -134,14 +132,13 @@ struct fingertip_item {
 
 /* The next packet or event, with its numbers. FINGERTIP_WAIT: feed more. FINGERTIP_END: that was all.
  * Where no info packet precedes a fingertip's first row, one is made of the head's keys; the counts are without it. */
-enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, struct fingertip_item *item,
-                                            double *values, size_t size, size_t *count);
+enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, struct fingertip_item *item, double *values, size_t size,
+                                            size_t *count);
 const char *fingertip_reader_event(const struct fingertip_reader *reader);
 
 /* 1: a capture of the line, no recording. */
 int fingertip_reader_is_capture(const struct fingertip_reader *reader);
-/* Whether the last line of a recording was seen, without which its recorder was killed or its disk was
- * full; 1 at the end of a capture. */
+/* Whether the last line of a recording was seen, without which its recorder was killed or its disk was full; 1 at the end of a capture. */
 int fingertip_reader_has_end(const struct fingertip_reader *reader);
 /* Lines that were skipped, and in a capture the line's counters by its packets. */
 uint64_t fingertip_reader_skipped(const struct fingertip_reader *reader);
@@ -160,24 +157,22 @@ struct fingertip_writer;
  * head, such as "started_utc: 2026-08-05T12:00:00.125Z", each ended by "\n". NULL on failure. */
 struct fingertip_writer *fingertip_writer_new(enum fingertip_format format, const double *info, const char *comments);
 /* A recording of several on one clock, host_zero_us of which its times are counted from. */
-struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format, const double *infos, size_t devices,
-                                                    int64_t host_zero_us, const char *comments);
+struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format, const double *infos, size_t devices, int64_t host_zero_us,
+                                                    const char *comments);
 void fingertip_writer_free(struct fingertip_writer *writer);
 
 /* A packet of a device, 0 in a recording of one. host_us: its time on the recorder's clock, for a recording of several
  * alone. A contact packet waits for the raw packet of its frame where the fingertip sends both. */
-enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, size_t device, uint8_t type,
-                                              const double *values, size_t count, double host_us);
+enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, size_t device, uint8_t type, const double *values,
+                                              size_t count, double host_us);
 /* "gone ..." and "back ..." with the time: the port vanished, and was there again. */
 enum fingertip_status fingertip_writer_event(struct fingertip_writer *writer, size_t device, const char *text);
 /* In a recording of several: the present estimate of fingertip_clock for a device. Rows from before
  * host_us will not come any more, so that lines until then may be written. */
-enum fingertip_status fingertip_writer_clock(struct fingertip_writer *writer, size_t device, const double estimate[4],
-                                             unsigned jumps);
+enum fingertip_status fingertip_writer_clock(struct fingertip_writer *writer, size_t device, const double estimate[4], unsigned jumps);
 enum fingertip_status fingertip_writer_settle(struct fingertip_writer *writer, double host_us);
 /* Last of all. counts: FINGERTIP_COUNTS of each device, one behind the other; reason: one word. */
-enum fingertip_status fingertip_writer_finish(struct fingertip_writer *writer, const char *reason,
-                                              const double *counts);
+enum fingertip_status fingertip_writer_finish(struct fingertip_writer *writer, const char *reason, const double *counts);
 /* Rows until now. */
 uint64_t fingertip_writer_frames(const struct fingertip_writer *writer);
 
@@ -220,8 +215,8 @@ size_t fingertip_number_text(float value, char *text, size_t size);
 
 /* What a UF2 file is the firmware of: board, version and commit, each a text of up to size - 1
  * characters. Fails unless it is whole, undamaged, and for the RP2040. name: of the file, for errors. */
-enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length, char *board,
-                                         char *version, char *git_hash, size_t size);
+enum fingertip_status fingertip_firmware(const char *name, const uint8_t *bytes, size_t length, char *board, char *version, char *git_hash,
+                                         size_t size);
 
 #ifdef __cplusplus
 }

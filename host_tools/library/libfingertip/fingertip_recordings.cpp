@@ -82,9 +82,7 @@ class MemorySink : public ByteSink {
 public:
   explicit MemorySink(std::string &bytes) : bytes_(bytes) {}
 
-  void append(const void *bytes, std::size_t length) override {
-    bytes_.append(static_cast<const char *>(bytes), length);
-  }
+  void append(const void *bytes, std::size_t length) override { bytes_.append(static_cast<const char *>(bytes), length); }
   void finish() override {}
   const std::string &path() const override { return name_; }
 
@@ -160,8 +158,8 @@ enum fingertip_status fingertip_reader_feed(struct fingertip_reader *reader, con
 
 uint64_t fingertip_reader_wants(const struct fingertip_reader *reader) { return reader->window.end(); }
 
-enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, struct fingertip_item *item,
-                                            double *values, size_t size, size_t *count) {
+enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, struct fingertip_item *item, double *values, size_t size,
+                                            size_t *count) {
   return guarded([&] {
     if (!reader || !item || !values || !count) {
       return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL");
@@ -201,17 +199,11 @@ enum fingertip_status fingertip_reader_next(struct fingertip_reader *reader, str
 
 const char *fingertip_reader_event(const struct fingertip_reader *reader) { return reader->event.c_str(); }
 
-int fingertip_reader_is_capture(const struct fingertip_reader *reader) {
-  return reader->packets && !reader->packets->recording();
-}
+int fingertip_reader_is_capture(const struct fingertip_reader *reader) { return reader->packets && !reader->packets->recording(); }
 
-int fingertip_reader_has_end(const struct fingertip_reader *reader) {
-  return reader->packets && reader->packets->has_end();
-}
+int fingertip_reader_has_end(const struct fingertip_reader *reader) { return reader->packets && reader->packets->has_end(); }
 
-uint64_t fingertip_reader_skipped(const struct fingertip_reader *reader) {
-  return reader->packets ? reader->packets->skipped_lines() : 0;
-}
+uint64_t fingertip_reader_skipped(const struct fingertip_reader *reader) { return reader->packets ? reader->packets->skipped_lines() : 0; }
 
 void fingertip_reader_counts(const struct fingertip_reader *reader, double counts[FINGERTIP_COUNTS]) {
   LineStatistics found;
@@ -258,8 +250,8 @@ struct fingertip_writer *fingertip_writer_new(enum fingertip_format format, cons
   });
 }
 
-struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format, const double *infos, size_t devices,
-                                                    int64_t host_zero_us, const char *comments) {
+struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format, const double *infos, size_t devices, int64_t host_zero_us,
+                                                    const char *comments) {
   return made(format, [&](fingertip_writer &writer, std::unique_ptr<LineSink> lines) {
     const auto all = infos_of(infos, devices);
     writer.devices = devices;
@@ -269,8 +261,8 @@ struct fingertip_writer *fingertip_writer_new_joint(enum fingertip_format format
 
 void fingertip_writer_free(struct fingertip_writer *writer) { delete writer; }
 
-enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, size_t device, uint8_t type,
-                                              const double *values, size_t count, double host_us) {
+enum fingertip_status fingertip_writer_packet(struct fingertip_writer *writer, size_t device, uint8_t type, const double *values,
+                                              size_t count, double host_us) {
   return written(writer, device, [&] {
     const wire_packet packet = packet_of(type, values, values ? count : 0);
     writer->recording->packet(device, packet, host_us);
@@ -281,8 +273,7 @@ enum fingertip_status fingertip_writer_event(struct fingertip_writer *writer, si
   return written(writer, device, [&] { writer->recording->event(device, printable(text ? text : "")); });
 }
 
-enum fingertip_status fingertip_writer_clock(struct fingertip_writer *writer, size_t device, const double estimate[4],
-                                             unsigned jumps) {
+enum fingertip_status fingertip_writer_clock(struct fingertip_writer *writer, size_t device, const double estimate[4], unsigned jumps) {
   return written(writer, device, [&] {
     if (estimate) {
       const ClockEstimate now = {static_cast<std::uint64_t>(estimate[0]), estimate[1], estimate[2], estimate[3]};
@@ -295,8 +286,7 @@ enum fingertip_status fingertip_writer_settle(struct fingertip_writer *writer, d
   return written(writer, 0, [&] { writer->recording->settle(host_us); });
 }
 
-enum fingertip_status fingertip_writer_finish(struct fingertip_writer *writer, const char *reason,
-                                              const double *counts) {
+enum fingertip_status fingertip_writer_finish(struct fingertip_writer *writer, const char *reason, const double *counts) {
   return written(writer, 0, [&] {
     std::vector<LineStatistics> all(writer->devices);
     for (std::size_t i = 0; counts && i < all.size(); i++) {

@@ -34,8 +34,7 @@ std::unique_ptr<LineSink> make_lines(std::unique_ptr<ByteSink> bytes, bool as_mc
 
 bool is_mcap_name(const std::string &path) {
   std::string end = path.substr(path.size() - std::min<std::size_t>(path.size(), 5));
-  std::transform(end.begin(), end.end(), end.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(end.begin(), end.end(), end.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return end == ".mcap";
 }
 

@@ -42,8 +42,7 @@ public:
 
   virtual ~LineSource() = default;
 
-  /* False at the end. Throws Error with file and place where they are damaged; the next call goes
-   * on behind the damage. */
+  /* False at the end. Throws Error with file and place where they are damaged; the next call goes on behind the damage. */
   virtual bool next(Line &line) = 0;
   /* The position of reading, to go back to. */
   virtual Place place() = 0;

@@ -64,9 +64,7 @@ std::string joined(const std::vector<std::string> &parts) {
   return all;
 }
 
-std::uint32_t crc_of(std::string_view bytes) {
-  return crc32_iso_hdlc(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size());
-}
+std::uint32_t crc_of(std::string_view bytes) { return crc32_iso_hdlc(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size()); }
 
 /* Largest chunk and record; they bound the memory that a false size costs. Recorders of cameras write some 100 MB. */
 constexpr std::uint64_t CHUNK_MOST_bytes = 1 << 28, RECORD_MOST_bytes = CHUNK_MOST_bytes + (1 << 16);
@@ -206,8 +204,7 @@ std::uint16_t Writer::schema(const std::string &name, const std::string &encodin
   return id;
 }
 
-std::uint16_t Writer::channel(const std::string &topic, std::uint16_t schema, const std::string &encoding,
-                              const Pairs &metadata) {
+std::uint16_t Writer::channel(const std::string &topic, std::uint16_t schema, const std::string &encoding, const Pairs &metadata) {
   auto id = static_cast<std::uint16_t>(channels_.size() + 1);
   std::string content;
   put_number(content, id);
@@ -231,8 +228,7 @@ void Writer::metadata(const std::string &name, const Pairs &pairs) {
   metadata_.push_back(record(METADATA_INDEX, index));
 }
 
-void Writer::attachment(std::uint64_t time_ns, const std::string &name, const std::string &media_type,
-                        const std::string &data) {
+void Writer::attachment(std::uint64_t time_ns, const std::string &name, const std::string &media_type, const std::string &data) {
   std::string content;
   put_number(content, time_ns);
   put_number(content, time_ns);
@@ -366,9 +362,7 @@ void Writer::finish() {
 std::optional<std::uint64_t> declared_size(std::string_view frame) {
   constexpr std::string_view BEGIN = "\x28\xb5\x2f\xfd";
   constexpr std::size_t DICTIONARY_bytes[] = {0, 1, 2, 4};
-  const auto byte = [&](std::size_t at) -> std::uint64_t {
-    return at < frame.size() ? static_cast<unsigned char>(frame[at]) : 0;
-  };
+  const auto byte = [&](std::size_t at) -> std::uint64_t { return at < frame.size() ? static_cast<unsigned char>(frame[at]) : 0; };
   const std::uint64_t descriptor = byte(BEGIN.size()), width = descriptor >> 6;
   const bool is_single = (descriptor >> 5 & 1) != 0;
   if (frame.substr(0, BEGIN.size()) != BEGIN || (width == 0 && !is_single)) {

@@ -1,7 +1,6 @@
-/* MCAP files (mcap.dev/spec). The writer packs chunks by zstd, each with its index. It appends a chunk at once, so that
- * a killed one leaves every chunk except the one under way. The reader gives messages in the order in which they are
- * in the file, so that one whose end is missing reads as far as it goes; chunks that are in another order than that of
- * time it reads by the index. */
+/* MCAP files (mcap.dev/spec). The writer packs chunks by zstd, each with its index. It appends a chunk at once, so that a killed one leaves
+ * every chunk except the one under way. The reader gives messages in the order in which they are in the file, so that one whose end is
+ * missing reads as far as it goes; chunks that are in another order than that of time it reads by the index. */
 #pragma once
 
 #include "libfingertip/line_source.hpp"
@@ -43,13 +42,11 @@ public:
 
   /* Their ids. */
   std::uint16_t schema(const std::string &name, const std::string &encoding, const std::string &data);
-  std::uint16_t channel(const std::string &topic, std::uint16_t schema, const std::string &encoding,
-                        const Pairs &metadata);
+  std::uint16_t channel(const std::string &topic, std::uint16_t schema, const std::string &encoding, const Pairs &metadata);
 
   /* Times are ns since 1970. */
   void metadata(const std::string &name, const Pairs &pairs);
-  void attachment(std::uint64_t time_ns, const std::string &name, const std::string &media_type,
-                  const std::string &data);
+  void attachment(std::uint64_t time_ns, const std::string &name, const std::string &media_type, const std::string &data);
   /* Ends the chunk before it once that is a second long or a megabyte large. */
   void message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data);
   /* Content until now outlives the writer. */
@@ -105,8 +102,7 @@ public:
   const std::vector<Message> &together() const { return messages_; }
   /* Whether a channel has it. */
   bool knows(const std::string &type) const;
-  /* From now on chunks outside of these times are left out, if there is an index, unless a needed channel is in them.
-   */
+  /* From now on chunks outside of these times are left out, if there is an index, unless a needed channel is in them. */
   void want(std::uint64_t from_ns, std::uint64_t to_ns, IsNeeded is_needed);
   /* Whether one was, since this was asked. */
   bool has_left_out() { return std::exchange(has_left_out_, false); }

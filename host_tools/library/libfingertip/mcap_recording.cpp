@@ -18,7 +18,7 @@ constexpr const char *CONTACT = "fingertip_msgs/Contact";
 constexpr const char *LINE = "fingertip_msgs/Line";
 constexpr const char *PERIODIC_LINES = "/fingertip/lines/periodic"; /* those that each second has */
 constexpr const char *PRESSURES = "sensor_msgs/PointCloud2";
-constexpr std::size_t WAITING_MOST = 1 << 16; /* lines for one before them, before it counts as lost: 50 s, 50 MB */
+constexpr std::size_t WAITING_MOST = 1 << 16;         /* lines for one before them, before it counts as lost: 50 s, 50 MB */
 constexpr std::uint64_t MESSAGE_MOST_bytes = 1 << 20; /* packed by itself */
 
 /* The name in schemas: "fingertip_msgs/msg/Line". */
@@ -66,15 +66,13 @@ static bool is_list(const std::string &key) {
   bool of_sensors = false;
   auto visit = [&](const char *name, auto) { of_sensors = of_sensors || key == name; };
   visit_sensor_lists(visit);
-  return of_sensors ||
-         std::any_of(std::begin(pad_lists), std::end(pad_lists), [&](const auto &each) { return key == each.name; });
+  return of_sensors || std::any_of(std::begin(pad_lists), std::end(pad_lists), [&](const auto &each) { return key == each.name; });
 }
 
 static bool begins_with(const std::string &text, const char *begin) { return text.rfind(begin, 0) == 0; }
 
 static bool is_of_calibration(const std::string &key) {
-  return begins_with(key, "calibration_") || begins_with(key, "force_scale") || begins_with(key, "pad_") ||
-         is_list(key);
+  return begins_with(key, "calibration_") || begins_with(key, "force_scale") || begins_with(key, "pad_") || is_list(key);
 }
 
 /* "# key: value" taken apart; nothing of other lines. */
@@ -130,9 +128,7 @@ static mcap::Reader::Message line_message(const ros::Line &line) {
   return {"/fingertip/lines", full_name(LINE), ros::encode({0, ""}, line), 0};
 }
 
-static std::string joint_cells(std::uint32_t device, double time_us) {
-  return std::to_string(device) + "," + fixed(time_us, 1) + ",";
-}
+static std::string joint_cells(std::uint32_t device, double time_us) { return std::to_string(device) + "," + fixed(time_us, 1) + ","; }
 
 LogClock::LogClock(const std::string &started_utc, const std::string &started_device_us)
     : begin_ns_(utc_ns(started_utc).value_or(0)), now_ns_(begin_ns_) {
@@ -257,8 +253,8 @@ void McapLineSink::begin() {
     }
   }
   std::map<std::string, std::uint16_t> schemas;
-  for (const char *name : {CONTACT, LINE, "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped", PRESSURES,
-                           "diagnostic_msgs/DiagnosticArray"}) {
+  for (const char *name :
+       {CONTACT, LINE, "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped", PRESSURES, "diagnostic_msgs/DiagnosticArray"}) {
     schemas[name] = writer_.schema(full_name(name), "ros2msg", ros::schema_of(name));
   }
   auto channel = [&](const std::string &topic, const char *name) {
@@ -379,8 +375,7 @@ bool McapLineSink::put_row(const std::string &text) {
   return true;
 }
 
-McapLineSource::McapLineSource(std::string path, std::unique_ptr<ByteSource> bytes)
-    : path_(std::move(path)), reader_(std::move(bytes)) {}
+McapLineSource::McapLineSource(std::string path, std::unique_ptr<ByteSource> bytes) : path_(std::move(path)), reader_(std::move(bytes)) {}
 
 bool McapLineSource::next(Line &line) {
   try {
@@ -414,8 +409,7 @@ bool McapLineSource::next(Line &line) {
   }
   if (!has_first_) {
     throw Error(ErrorCode::not_a_recording,
-                path_ + (reader_.is_torn() ? ": breaks off before a recording begins"
-                                           : ": an MCAP file, but no recording of a fingertip"));
+                path_ + (reader_.is_torn() ? ": breaks off before a recording begins" : ": an MCAP file, but no recording of a fingertip"));
   }
   if (reader_.is_torn() && !reported_torn_) {
     reported_torn_ = true;
@@ -446,9 +440,8 @@ void McapLineSource::take(mcap::Reader::Message message) {
     }
     if (!wanted_s_.is_all()) {
       const auto at = [&](double s) { return shifted_ns(*begin_ns_, s * 1e6); };
-      reader_.want(at(wanted_s_.from_s), at(wanted_s_.to_s), [](const std::string &topic, const std::string &type) {
-        return type == full_name(LINE) && topic != PERIODIC_LINES;
-      });
+      reader_.want(at(wanted_s_.from_s), at(wanted_s_.to_s),
+                   [](const std::string &topic, const std::string &type) { return type == full_name(LINE) && topic != PERIODIC_LINES; });
     }
   }
   if (topic_.empty()) {
@@ -462,14 +455,12 @@ void McapLineSource::take(mcap::Reader::Message message) {
     }
     waiting_.emplace(number, std::move(message));
   } else if (!is_contact) {
-    throw Error(ErrorCode::unread_kind,
-                path_ + ": chunks in another order than that of time, and no index: mcap recover FILE -o OUT");
+    throw Error(ErrorCode::unread_kind, path_ + ": chunks in another order than that of time, and no index: mcap recover FILE -o OUT");
   } else if (message.topic == topic_) {
     waiting_.emplace(number_ + waiting_.size() + 1, std::move(message));
   } else {
-    throw Error(ErrorCode::unread_kind,
-                path_ + ": topics of several fingertips, and no lines of a recording. Take one: " +
-                    "mcap filter FILE -y '" + printable(topic_.substr(0, topic_.rfind('/'))) + "/.*' -o OUT");
+    throw Error(ErrorCode::unread_kind, path_ + ": topics of several fingertips, and no lines of a recording. Take one: " +
+                                            "mcap filter FILE -y '" + printable(topic_.substr(0, topic_.rfind('/'))) + "/.*' -o OUT");
   }
 }
 
@@ -501,8 +492,7 @@ LineSource::Line McapLineSource::line_of(std::uint64_t number, const mcap::Reade
     if (row && !topic_.empty()) {
       row->time_us.reset(); /* a recording of one */
     }
-    if (!row || !has_header_ || row->time_us.has_value() != joint_ ||
-        (row->raw && row->raw->body.raw.sensor_count != sensor_count_)) {
+    if (!row || !has_header_ || row->time_us.has_value() != joint_ || (row->raw && row->raw->body.raw.sensor_count != sensor_count_)) {
       throw mcap::Damage("a message on " + printable(message.topic) +
                          " is damaged, or of another version of this tool, which can convert "
                          "it to CSV");

@@ -42,10 +42,8 @@ template <std::size_t count> static const char *word_of(const words::Word (&all)
   return found ? found->word : nullptr;
 }
 
-template <std::size_t count>
-static std::string bits_text(const words::Word (&all)[count], std::uint32_t bits, const char *none) {
-  const std::string text =
-      joined(all, ",", [&](const words::Word &each) { return bits & each.value ? each.word : ""; });
+template <std::size_t count> static std::string bits_text(const words::Word (&all)[count], std::uint32_t bits, const char *none) {
+  const std::string text = joined(all, ",", [&](const words::Word &each) { return bits & each.value ? each.word : ""; });
   return text.empty() ? none : text;
 }
 
@@ -59,9 +57,7 @@ std::string result_text(std::uint8_t result) {
   return word ? word : "result " + std::to_string(result);
 }
 
-std::string capabilities_text(std::uint32_t capabilities) {
-  return bits_text(words::capabilities, capabilities, "none");
-}
+std::string capabilities_text(std::uint32_t capabilities) { return bits_text(words::capabilities, capabilities, "none"); }
 
 std::string stored_text(std::uint32_t stored) { return bits_text(words::stored, stored, "nothing"); }
 

@@ -16,12 +16,9 @@ namespace fs = std::filesystem;
 
 [[noreturn]] void fail(const std::string &path, int error) {
   switch (error) {
-  case EEXIST:
-    throw Error(ErrorCode::file_exists, path + ": exists already");
-  case EISDIR:
-    throw Error(ErrorCode::is_folder, path + ": is a folder");
-  default:
-    throw Error(ErrorCode::cannot_write, path + ": " + std::strerror(error));
+  case EEXIST: throw Error(ErrorCode::file_exists, path + ": exists already");
+  case EISDIR: throw Error(ErrorCode::is_folder, path + ": is a folder");
+  default: throw Error(ErrorCode::cannot_write, path + ": " + std::strerror(error));
   }
 }
 

@@ -1,5 +1,4 @@
-/* Files that the tools write. They replace a file only if that is allowed, and never one that is
- * being read. They throw Error. */
+/* Files that the tools write. They replace a file only if that is allowed, and never one that is being read. They throw Error. */
 #pragma once
 
 #include <cstddef>

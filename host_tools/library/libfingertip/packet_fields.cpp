@@ -34,18 +34,14 @@ Metadata info_metadata(const wire_info &info) {
   PairWriter writer;
   visit_info(writer, copy);
   pairs.insert(pairs.end(), writer.pairs.begin(), writer.pairs.end());
-  auto list = [&](const char *name, auto value_of) {
-    pairs.emplace_back(name, list_text(value_of, info.sensor_count));
-  };
+  auto list = [&](const char *name, auto value_of) { pairs.emplace_back(name, list_text(value_of, info.sensor_count)); };
   list("x_mm", [&](std::size_t k) { return info.x_mm[k]; });
   list("y_mm", [&](std::size_t k) { return info.y_mm[k]; });
   if (info.stored & WIRE_STORED_CALIBRATION) {
     PairWriter of_calibration;
     visit_calibration(of_calibration, copy.calibration);
     pairs.insert(pairs.end(), of_calibration.pairs.begin(), of_calibration.pairs.end());
-    auto visit = [&](const char *name, auto member) {
-      list(name, [&](std::size_t k) { return info.calibration.sensors[k].*member; });
-    };
+    auto visit = [&](const char *name, auto member) { list(name, [&](std::size_t k) { return info.calibration.sensors[k].*member; }); };
     visit_sensor_lists(visit);
   }
   if (info.stored & WIRE_STORED_PAD) {

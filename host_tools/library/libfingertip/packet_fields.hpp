@@ -30,8 +30,7 @@ inline bool sends_both(const wire_info &info) {
   return (info.capabilities & BOTH) == BOTH;
 }
 
-/* The scalar fields of an info packet, the sensor positions, and the calibration and the pad's
- * profile where there are any. */
+/* The scalar fields of an info packet, the sensor positions, and the calibration and the pad's profile where there are any. */
 Metadata info_metadata(const wire_info &info);
 
 /* The counters of a health packet. */

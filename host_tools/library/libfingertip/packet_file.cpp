@@ -15,8 +15,7 @@ PacketFile::PacketFile(const std::string &path, bool salvage, const std::string 
   }
 }
 
-PacketFile::PacketFile(const std::string &path, bool salvage, std::unique_ptr<ByteSource> bytes)
-    : bytes_(std::move(bytes)) {
+PacketFile::PacketFile(const std::string &path, bool salvage, std::unique_ptr<ByteSource> bytes) : bytes_(std::move(bytes)) {
   if (is_recording(path, *bytes_)) {
     reader_ = std::make_unique<RecordingReader>(path, salvage, lines_of(path, std::move(bytes_)));
   }

@@ -48,8 +48,7 @@ public:
   Place place();
   void go_to(const Place &place);
 
-  /* The line's counters by the packets until now. At the end of a recording they are those of its
-   * recorder, which saw the line itself. */
+  /* The line's counters by the packets until now. At the end of a recording they are those of its recorder, which saw the line itself. */
   const LineStatistics &statistics() const { return state_.statistics; }
   /* At the end of the file: a recording without its end line. */
   bool is_cut_short() const { return state_.ended && !has_end(); }

@@ -34,8 +34,8 @@ void ProgressBar::show(double share) {
   }
   constexpr int WIDTH = 40;
   const int full = WIDTH * percent / 100;
-  std::fprintf(stderr, "\r%s [%s%s] %3d %%", what_.c_str(), std::string(full, '#').c_str(),
-               std::string(WIDTH - full, '.').c_str(), percent);
+  std::fprintf(stderr, "\r%s [%s%s] %3d %%", what_.c_str(), std::string(full, '#').c_str(), std::string(WIDTH - full, '.').c_str(),
+               percent);
   std::fflush(stderr);
 }
 

@@ -1,5 +1,4 @@
-/* The progress of a long job, on stderr: a bar that is redrawn on a terminal; elsewhere a line each
- * tenth, or nothing. */
+/* The progress of a long job, on stderr: a bar that is redrawn on a terminal; elsewhere a line each tenth, or nothing. */
 #pragma once
 
 #include <string>

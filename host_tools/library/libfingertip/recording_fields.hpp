@@ -56,9 +56,7 @@ struct RowWriter {
 
 struct PairWriter {
   Metadata pairs;
-  template <typename Value> void operator()(const std::string &name, const Value &value) {
-    pairs.emplace_back(name, cell_text(value));
-  }
+  template <typename Value> void operator()(const std::string &name, const Value &value) { pairs.emplace_back(name, cell_text(value)); }
   std::string text() const {
     std::string joined;
     for (const auto &[key, value] : pairs) {
@@ -159,8 +157,7 @@ struct RowPackets {
 };
 
 /* From t_us on. */
-inline std::string row_text(const wire_packet *contact, const wire_packet *raw, std::uint8_t sensor_count,
-                            int sets = LATER_SETS) {
+inline std::string row_text(const wire_packet *contact, const wire_packet *raw, std::uint8_t sensor_count, int sets = LATER_SETS) {
   const wire_packet &any = contact ? *contact : *raw;
   std::uint32_t frame = contact ? contact->body.contact.frame : raw->body.raw.frame;
   RowWriter writer;
@@ -186,12 +183,10 @@ inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, in
   std::size_t contact_count = contact_columns(sets);
   std::size_t raw_count = RAW_COLUMNS + 2 * std::size_t{sensor_count};
   if (cells.size() != 2 + contact_count + raw_count) {
-    throw Damage{std::to_string(cells.size()) + " columns where the header has " +
-                 std::to_string(2 + contact_count + raw_count)};
+    throw Damage{std::to_string(cells.size()) + " columns where the header has " + std::to_string(2 + contact_count + raw_count)};
   }
   auto is_empty = [&](std::size_t from, std::size_t count) {
-    return std::all_of(cells.begin() + static_cast<std::ptrdiff_t>(from),
-                       cells.begin() + static_cast<std::ptrdiff_t>(from + count),
+    return std::all_of(cells.begin() + static_cast<std::ptrdiff_t>(from), cells.begin() + static_cast<std::ptrdiff_t>(from + count),
                        [](std::string_view cell) { return cell.empty(); });
   };
   std::uint64_t t_us = 0;

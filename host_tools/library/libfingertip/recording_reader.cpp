@@ -75,8 +75,7 @@ private:
 /* See within. */
 class LinesWithin : public LineSource {
 public:
-  LinesWithin(std::unique_ptr<LineSource> lines, const TimeSpan &interval)
-      : lines_(std::move(lines)), interval_(interval) {
+  LinesWithin(std::unique_ptr<LineSource> lines, const TimeSpan &interval) : lines_(std::move(lines)), interval_(interval) {
     lines_->want(interval.from_s, interval.to_s);
   }
 
@@ -168,16 +167,15 @@ std::string format_of(const std::string &path, const std::string &line) {
   if (words.substr(0, begin.size()) == begin) {
     std::string format(words.substr(begin.size()));
     if (format != FORMAT_OF_ONE && format != FORMAT_OF_SEVERAL) {
-      throw Error(ErrorCode::other_format, path + ":1: recording format \"" + format + "\" is unknown, " +
-                                               FORMAT_OF_ONE + " and " + FORMAT_OF_SEVERAL + " are known");
+      throw Error(ErrorCode::other_format, path + ":1: recording format \"" + format + "\" is unknown, " + FORMAT_OF_ONE + " and " +
+                                               FORMAT_OF_SEVERAL + " are known");
     }
     return format;
   }
   std::string kind(words.substr(0, OUR_FILES.size()) == OUR_FILES ? words.substr(OUR_FILES.size()) : "");
   throw Error(ErrorCode::not_a_recording,
-              path + (kind.empty()
-                          ? ":1: no recording; its first line is not \"" + std::string(begin) + FORMAT_OF_ONE + "\""
-                          : ": a " + kind.substr(0, kind.find(' ')) + ", not a recording"));
+              path + (kind.empty() ? ":1: no recording; its first line is not \"" + std::string(begin) + FORMAT_OF_ONE + "\""
+                                   : ": a " + kind.substr(0, kind.find(' ')) + ", not a recording"));
 }
 
 /* Throws Error for a file that may hold a recording, with what makes one of it that is read. */
@@ -235,8 +233,7 @@ std::unique_ptr<LineSource> within(std::unique_ptr<LineSource> lines, const Time
   return interval.is_all() ? std::move(lines) : std::make_unique<LinesWithin>(std::move(lines), interval);
 }
 
-RecordingReader::RecordingReader(const std::string &path, bool salvage, const std::string &device,
-                                 const TimeSpan &interval)
+RecordingReader::RecordingReader(const std::string &path, bool salvage, const std::string &device, const TimeSpan &interval)
     : path_(path), salvage_(salvage), source_(within(open_lines(path), interval)), wanted_(device) {
   begin();
 }
@@ -347,8 +344,7 @@ void RecordingReader::read_line(const std::string &text) {
     if (!columns || (joint_ && devices_.empty())) {
       if (text.find_first_of(";\t\"") != std::string::npos) {
         throw Error(ErrorCode::unread_kind,
-                    path_ +
-                        ": cells between semicolons or tabs, or in quotes: a spreadsheet's? Save it with commas alone");
+                    path_ + ": cells between semicolons or tabs, or in quotes: a spreadsheet's? Save it with commas alone");
       }
       throw Damage{"unknown header"};
     }

@@ -28,7 +28,7 @@ public:
     std::string event;
     std::optional<double> time_us = {}; /* of a joint recording's rows, on the recorder's clock */
     std::uint32_t device = 0;           /* in a joint recording */
-    bool made = false; /* an info packet of the head's keys: no such packet is in the file before the first row */
+    bool made = false;                  /* an info packet of the head's keys: no such packet is in the file before the first row */
   };
 
   /* salvage: skip damaged lines and count them, instead of throwing Error with file and line.

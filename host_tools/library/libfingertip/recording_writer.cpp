@@ -29,32 +29,29 @@ template <typename Device, typename Bound> static double two_largest(const std::
 }
 
 static std::string edges_text(const EdgeCounter &edges) {
-  return edges.edges() == 0
-             ? ""
-             : " edges=" + std::to_string(edges.edges()) + " edges_missing=" + std::to_string(edges.missing());
+  return edges.edges() == 0 ? "" : " edges=" + std::to_string(edges.edges()) + " edges_missing=" + std::to_string(edges.missing());
 }
 
 static std::string clock_text(const ClockEstimate &clock) {
   return " drift_ppm=" + fixed(clock.drift_ppm, 3) + " uncertainty_us=" + fixed(clock.uncertainty_us, 1);
 }
 
-RecordingWriter::RecordingWriter(std::unique_ptr<LineSink> file, const wire_info *info, std::uint8_t sensor_count,
-                                 const Metadata &extra, bool raw_expected)
+RecordingWriter::RecordingWriter(std::unique_ptr<LineSink> file, const wire_info *info, std::uint8_t sensor_count, const Metadata &extra,
+                                 bool raw_expected)
     : file_(std::move(file)), sensor_count_(sensor_count), raw_expected_(raw_expected), devices_(1), edges_(1) {
   file_->line(std::string(FIRST_WORDS) + FORMAT_OF_ONE);
   begin(extra, info ? std::vector<wire_info>{*info} : std::vector<wire_info>());
 }
 
-RecordingWriter::RecordingWriter(std::unique_ptr<LineSink> file, const std::vector<wire_info> &infos,
-                                 const Metadata &extra, std::int64_t host_zero_us, bool raw_expected)
-    : file_(std::move(file)), sensor_count_(infos[0].sensor_count), raw_expected_(raw_expected),
-      host_zero_us_(host_zero_us), devices_(infos.size()), edges_(infos.size()) {
+RecordingWriter::RecordingWriter(std::unique_ptr<LineSink> file, const std::vector<wire_info> &infos, const Metadata &extra,
+                                 std::int64_t host_zero_us, bool raw_expected)
+    : file_(std::move(file)), sensor_count_(infos[0].sensor_count), raw_expected_(raw_expected), host_zero_us_(host_zero_us),
+      devices_(infos.size()), edges_(infos.size()) {
   std::string serials;
   for (const wire_info &info : infos) {
     if (info.sensor_count != sensor_count_) {
       throw Error(ErrorCode::other_sensor_count, "fingertips with " + std::to_string(sensor_count_) + " and " +
-                                                     std::to_string(info.sensor_count) +
-                                                     " sensors do not fit into one file");
+                                                     std::to_string(info.sensor_count) + " sensors do not fit into one file");
     }
     serials += " " + text_field(info.serial);
   }
@@ -86,13 +83,10 @@ void RecordingWriter::line(std::size_t device, double host_us, const std::string
 }
 
 void RecordingWriter::write_comment(std::size_t device, const std::string &key, const std::string &value) {
-  line(device, devices_[device].packet_host_us,
-       "# " + (host_zero_us_ ? std::to_string(device) + "/" : "") + key + ": " + value);
+  line(device, devices_[device].packet_host_us, "# " + (host_zero_us_ ? std::to_string(device) + "/" : "") + key + ": " + value);
 }
 
-std::string RecordingWriter::time_text(double host_us) const {
-  return fixed(host_us - static_cast<double>(*host_zero_us_), 1);
-}
+std::string RecordingWriter::time_text(double host_us) const { return fixed(host_us - static_cast<double>(*host_zero_us_), 1); }
 
 void RecordingWriter::write_info(std::size_t device, const wire_info &info) {
   Metadata &last = devices_[device].info;
@@ -148,8 +142,8 @@ void RecordingWriter::place(std::size_t device, const wire_packet &packet, doubl
   state.packet_t_us = packet.t_us;
   state.packet_host_us = place ? place->host_us : host_us;
   if (place) {
-    edges_alignment_us_ = std::max(edges_alignment_us_,
-                                   two_largest(devices_, [](const Device &each) { return each.edges_uncertainty_us; }));
+    edges_alignment_us_ =
+        std::max(edges_alignment_us_, two_largest(devices_, [](const Device &each) { return each.edges_uncertainty_us; }));
   }
 }
 
@@ -173,8 +167,7 @@ void RecordingWriter::packet(std::size_t device, const wire_packet &packet, doub
     return;
   case WIRE_RAW:
     if (packet.body.raw.sensor_count != sensor_count_) {
-      throw Error(ErrorCode::other_sensor_count, path() + ": the fingertip now has " +
-                                                     std::to_string(packet.body.raw.sensor_count) +
+      throw Error(ErrorCode::other_sensor_count, path() + ": the fingertip now has " + std::to_string(packet.body.raw.sensor_count) +
                                                      " sensors instead of " + std::to_string(sensor_count_));
     }
     if (state.pending_contact && state.pending_contact->body.contact.frame == packet.body.raw.frame &&
@@ -199,11 +192,8 @@ void RecordingWriter::packet(std::size_t device, const wire_packet &packet, doub
     state.edges.take(packet.body.sync);
     visit_sync(fields, copy.body.sync);
     break;
-  case WIRE_INFO:
-    name = PACKET_INFO;
-    break;
-  default:
-    return;
+  case WIRE_INFO: name = PACKET_INFO; break;
+  default: return;
   }
   write_pending(device);
   if (packet.type == WIRE_INFO) {
@@ -228,13 +218,12 @@ void RecordingWriter::clock(std::size_t device, const ClockEstimate &estimate, u
   state.jumps = jumps;
   edges_.clock(device, estimate);
   alignment_us_ =
-      std::max(alignment_us_,
-               two_largest(devices_, [](const Device &each) { return each.clock ? each.clock->uncertainty_us : 0; }));
+      std::max(alignment_us_, two_largest(devices_, [](const Device &each) { return each.clock ? each.clock->uncertainty_us : 0; }));
   if (estimate.host_us - state.clock_written_us >= CLOCK_INTERVAL_us) {
     state.clock_written_us = estimate.host_us;
     line(device, estimate.host_us,
-         "# " + std::to_string(device) + "/clock: t_us=" + std::to_string(estimate.device_us) +
-             " time_us=" + time_text(estimate.host_us) + clock_text(estimate));
+         "# " + std::to_string(device) + "/clock: t_us=" + std::to_string(estimate.device_us) + " time_us=" + time_text(estimate.host_us) +
+             clock_text(estimate));
   }
 }
 
@@ -269,9 +258,8 @@ void RecordingWriter::finish(const std::vector<LineStatistics> &statistics, cons
     const Device &device = devices_[i];
     sum += statistics[i];
     if (host_zero_us_) {
-      file_->line("# " + std::to_string(i) + "/end: frames=" + std::to_string(device.frames) +
-                  " jumps=" + std::to_string(device.jumps) + (device.clock ? clock_text(*device.clock) : "") +
-                  edges_text(device.edges) + " " + statistics[i].text());
+      file_->line("# " + std::to_string(i) + "/end: frames=" + std::to_string(device.frames) + " jumps=" + std::to_string(device.jumps) +
+                  (device.clock ? clock_text(*device.clock) : "") + edges_text(device.edges) + " " + statistics[i].text());
     }
   }
   /* Of one: device time over all runs of a device that restarted. */
@@ -283,8 +271,8 @@ void RecordingWriter::finish(const std::vector<LineStatistics> &statistics, cons
     more = " alignment_us=" + fixed(alignment_us_, 1) +
            (edges_alignment_us_ > 0 ? " edges_alignment_us=" + fixed(edges_alignment_us_, 1) : "");
   }
-  file_->line("# end: reason=" + reason + " frames=" + std::to_string(frames()) + " seconds=" + fixed(us / 1e6, 6) +
-              more + " " + sum.text());
+  file_->line("# end: reason=" + reason + " frames=" + std::to_string(frames()) + " seconds=" + fixed(us / 1e6, 6) + more + " " +
+              sum.text());
   file_->finish();
 }
 

@@ -20,11 +20,11 @@ class RecordingWriter {
 public:
   /* Of one. info: nullptr: not known yet. sensor_count: columns for raw packets, 0 to FT_MAX_SENSORS; extra: the
    * recorder's own metadata. raw_expected: a contact packet waits for the raw packet of its frame, to share its row. */
-  RecordingWriter(std::unique_ptr<LineSink> file, const wire_info *info, std::uint8_t sensor_count,
-                  const Metadata &extra, bool raw_expected);
+  RecordingWriter(std::unique_ptr<LineSink> file, const wire_info *info, std::uint8_t sensor_count, const Metadata &extra,
+                  bool raw_expected);
   /* Of several, with equally many sensors, or Error. */
-  RecordingWriter(std::unique_ptr<LineSink> file, const std::vector<wire_info> &infos, const Metadata &extra,
-                  std::int64_t host_zero_us, bool raw_expected);
+  RecordingWriter(std::unique_ptr<LineSink> file, const std::vector<wire_info> &infos, const Metadata &extra, std::int64_t host_zero_us,
+                  bool raw_expected);
   RecordingWriter(const RecordingWriter &) = delete;
   RecordingWriter &operator=(const RecordingWriter &) = delete;
 
@@ -38,8 +38,7 @@ public:
 
   /* The rest is for recordings of several, and does nothing in others. */
   void clock(std::size_t device, const ClockEstimate &estimate, unsigned jumps);
-  /* A comment of the recorder's own, "# key: value", in order of time with the rows. The key holds no slash
-   * and is no key of the format. */
+  /* A comment of the recorder's own, "# key: value", in order of time with the rows. The key holds no slash and is no key of the format. */
   void comment(const std::string &key, double host_us, const std::string &value);
   /* Lines older than this on the recorder's clock may go to the file. */
   void settle(double host_us);
@@ -74,8 +73,7 @@ private:
 
   void begin(const Metadata &extra, const std::vector<wire_info> &infos);
   void place(std::size_t device, const wire_packet &packet, double host_us);
-  /* At once in a recording of one; else among those that wait, but never before an earlier one of the same fingertip.
-   */
+  /* At once in a recording of one; else among those that wait, but never before an earlier one of the same fingertip. */
   void line(std::size_t device, double host_us, const std::string &text);
   void write_comment(std::size_t device, const std::string &key, const std::string &value);
   void write_row(std::size_t device, const wire_packet *contact, const wire_packet *raw);

@@ -102,9 +102,7 @@ void skip_header(CdrReader &reader) {
   reader.get(frame_id);
 }
 
-bool is_trusted(std::uint32_t flags) {
-  return (flags & (CONTACT_FLAG_FIT_VALID | warning_flags())) == CONTACT_FLAG_FIT_VALID;
-}
+bool is_trusted(std::uint32_t flags) { return (flags & (CONTACT_FLAG_FIT_VALID | warning_flags())) == CONTACT_FLAG_FIT_VALID; }
 
 /* Tared, and without a warning nothing presses. */
 bool is_untouched(std::uint32_t flags) {
@@ -121,8 +119,8 @@ void put(CdrWriter &writer, const Vector &vector) {
   writer.put(vector.z);
 }
 
-std::string status(const Header &header, const std::string &name, const std::string &trouble,
-                   const std::string &otherwise, const std::string &serial, const Metadata &values) {
+std::string status(const Header &header, const std::string &name, const std::string &trouble, const std::string &otherwise,
+                   const std::string &serial, const Metadata &values) {
   enum : std::uint8_t { OK, WARN };
   CdrWriter writer = begun(header);
   writer.count(1);
@@ -191,9 +189,7 @@ struct CdrGet {
 
 constexpr std::uint8_t WITHOUT_SENSORS = 0;
 
-std::uint32_t frame_of(const Row &row) {
-  return row.contact ? row.contact->body.contact.frame : row.raw->body.raw.frame;
-}
+std::uint32_t frame_of(const Row &row) { return row.contact ? row.contact->body.contact.frame : row.raw->body.raw.frame; }
 
 } // namespace
 
@@ -242,13 +238,12 @@ std::string wrench(const Header &header, const wire_contact &contact) {
 
 std::string place(const Header &header, const wire_contact &contact) {
   CdrWriter writer = begun(header);
-  put(writer, is_trusted(contact.flags) ? Vector{metres(contact.x_mm), metres(contact.y_mm), 0}
-                                        : Vector{NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER});
+  put(writer,
+      is_trusted(contact.flags) ? Vector{metres(contact.x_mm), metres(contact.y_mm), 0} : Vector{NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER});
   return writer.bytes();
 }
 
-std::string pressures(const Header &header, const wire_raw &raw, const std::vector<float> &x_mm,
-                      const std::vector<float> &y_mm) {
+std::string pressures(const Header &header, const wire_raw &raw, const std::vector<float> &x_mm, const std::vector<float> &y_mm) {
   constexpr std::uint8_t FLOAT32 = 7;
   constexpr std::uint32_t SIZE = sizeof(float);
   const char *const names[] = {"x", "y", "z", "pressure_pa"};

@@ -36,8 +36,7 @@ std::string wrench(const Header &header, const wire_contact &contact);
 std::string place(const Header &header, const wire_contact &contact);
 
 /* sensor_msgs/PointCloud2; x_mm and y_mm of each sensor. */
-std::string pressures(const Header &header, const wire_raw &raw, const std::vector<float> &x_mm,
-                      const std::vector<float> &y_mm);
+std::string pressures(const Header &header, const wire_raw &raw, const std::vector<float> &x_mm, const std::vector<float> &y_mm);
 
 /* diagnostic_msgs/DiagnosticArray of one status: a health packet's, and a contact's warnings. */
 std::string health(const Header &header, const std::string &serial, unsigned sensors, const Metadata &fields);

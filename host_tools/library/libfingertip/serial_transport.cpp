@@ -20,18 +20,13 @@ static Error open_error(const std::string &path, int error) {
   switch (error) {
   case ENOENT:
   case ENODEV:
-  case ENXIO:
-    return Error(ErrorCode::no_port, path + ": no such port");
+  case ENXIO: return Error(ErrorCode::no_port, path + ": no such port");
   case EBUSY:
-  case EWOULDBLOCK:
-    return Error(ErrorCode::port_in_use, path + ": in use by another program");
+  case EWOULDBLOCK: return Error(ErrorCode::port_in_use, path + ": in use by another program");
   case EACCES:
-  case EPERM:
-    return Error(ErrorCode::permission_denied, path + ": permission denied");
-  case ENOTTY:
-    return Error(ErrorCode::not_a_port, path + ": no serial port");
-  default:
-    return Error(ErrorCode::cannot_open, path + ": cannot open (" + std::strerror(error) + ")");
+  case EPERM: return Error(ErrorCode::permission_denied, path + ": permission denied");
+  case ENOTTY: return Error(ErrorCode::not_a_port, path + ": no serial port");
+  default: return Error(ErrorCode::cannot_open, path + ": cannot open (" + std::strerror(error) + ")");
   }
 }
 
@@ -105,8 +100,7 @@ bool SerialTransport::reopen() {
 
 bool SerialTransport::ask_loader() {
   termios settings;
-  if (fd_ < 0 || tcgetattr(fd_, &settings) != 0 || cfsetspeed(&settings, B1200) != 0 ||
-      tcsetattr(fd_, TCSANOW, &settings) != 0) {
+  if (fd_ < 0 || tcgetattr(fd_, &settings) != 0 || cfsetspeed(&settings, B1200) != 0 || tcsetattr(fd_, TCSANOW, &settings) != 0) {
     return false;
   }
   close();

@@ -1,8 +1,6 @@
-/* A fingertip on a serial port of the system: USB CDC (/dev/ttyACM*, /dev/serial/by-id/...) or a
- * pseudo-terminal; any path will do.
+/* A fingertip on a serial port of the system: USB CDC (/dev/ttyACM*, /dev/serial/by-id/...) or a pseudo-terminal; any path will do.
  *
- * The port is held exclusively while open. It is raw from the first moment, so that the system
- * neither echoes nor changes a byte. */
+ * The port is held exclusively while open. It is raw from the first moment, so that the system neither echoes nor changes a byte. */
 #pragma once
 
 #include "libfingertip/descriptor_transport.hpp"

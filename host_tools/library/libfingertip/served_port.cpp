@@ -17,9 +17,7 @@ namespace fingertip {
 /* Nothing can be waited for on a terminal that no program has open: it has to be asked. */
 constexpr std::chrono::milliseconds LOOK_INTERVAL{2};
 
-static Error failure(const std::string &what) {
-  return Error(ErrorCode::cannot_open, what + " (" + std::strerror(errno) + ")");
-}
+static Error failure(const std::string &what) { return Error(ErrorCode::cannot_open, what + " (" + std::strerror(errno) + ")"); }
 
 ServedPort::ServedPort(const std::string &link) : link_(link) {
   char name[64];

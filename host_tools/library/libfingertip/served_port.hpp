@@ -31,8 +31,7 @@ public:
   bool is_open() const { return is_open_; }
   /* The number of bytes that were there to read; 0: none now. Never waits. */
   std::size_t read(std::uint8_t *bytes, std::size_t capacity);
-  /* The number of bytes that were taken, perhaps not all. While no program has the port open, all
-   * are taken and lost. Never waits. */
+  /* The number of bytes that were taken, perhaps not all. While no program has the port open, all are taken and lost. Never waits. */
   std::size_t write(const std::uint8_t *bytes, std::size_t length);
   /* How many written bytes the other program has not read yet; 0 or more: a socket counts its own overhead too. */
   std::size_t unread() const;

@@ -13,14 +13,10 @@ constexpr int NEWER_VERSIONS = 2;
 
 static ErrorCode refusal_code(std::uint8_t result) {
   switch (result) {
-  case WIRE_RESULT_UNKNOWN_COMMAND:
-    return ErrorCode::unknown_command;
-  case WIRE_RESULT_OUT_OF_RANGE:
-    return ErrorCode::refused_value;
-  case WIRE_RESULT_NOT_NOW:
-    return ErrorCode::not_now;
-  default:
-    return ErrorCode::refused;
+  case WIRE_RESULT_UNKNOWN_COMMAND: return ErrorCode::unknown_command;
+  case WIRE_RESULT_OUT_OF_RANGE: return ErrorCode::refused_value;
+  case WIRE_RESULT_NOT_NOW: return ErrorCode::not_now;
+  default: return ErrorCode::refused;
   }
 }
 
@@ -126,8 +122,7 @@ wire_packet Session::exchange(const wire_packet &command, std::uint8_t answer_ty
     }
     if (statistics().version_errors > version_errors) {
       throw Error(ErrorCode::other_version, transport_.description() + ": speaks protocol version " +
-                                                std::to_string(decoder_.other_version()) + ", not " +
-                                                std::to_string(WIRE_VERSION));
+                                                std::to_string(decoder_.other_version()) + ", not " + std::to_string(WIRE_VERSION));
     }
   }
   if (repeat_refused_) {

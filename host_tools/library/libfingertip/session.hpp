@@ -26,8 +26,7 @@ public:
 /* The stop function of the session returned true in the middle of a command. */
 class Interrupted : public std::exception {};
 
-/* device time = host time + offset, good to the uncertainty (half the best round trip). Host time
- * is std::chrono::steady_clock in us. */
+/* device time = host time + offset, good to the uncertainty (half the best round trip). Host time is std::chrono::steady_clock in us. */
 struct ClockRelation {
   std::int64_t device_minus_host_us;
   std::int64_t uncertainty_us;

@@ -121,12 +121,9 @@ SocketTransport::SocketTransport(const std::string &path) : DescriptorTransport(
   throw Error(ErrorCode::cannot_open, path + ": cannot open (" + std::strerror(errno) + ")");
 }
 
-ssize_t SocketTransport::put(const std::uint8_t *bytes, std::size_t length) {
-  return send(fd_, bytes, length, MSG_NOSIGNAL);
-}
+ssize_t SocketTransport::put(const std::uint8_t *bytes, std::size_t length) { return send(fd_, bytes, length, MSG_NOSIGNAL); }
 
-Transport::Result SocketTransport::read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
-                                        std::chrono::milliseconds timeout) {
+Transport::Result SocketTransport::read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length, std::chrono::milliseconds timeout) {
   const Result result = DescriptorTransport::read(bytes, capacity, length, timeout);
   if (std::string_view(reinterpret_cast<const char *>(bytes), *length) == SHARE_IS_FULL) {
     throw Error(ErrorCode::port_in_use, path_ + ": as many programs use this fingertip as can share it");

@@ -1,7 +1,6 @@
-/* Fingertips that `fingertip serve` shares. Each is a Unix socket SERIAL.sock, with the link
- * SERIAL.port beside it to its serial port, if it has one. A connection to the socket is a line to
- * the fingertip (PROTOCOL.md), which others share at the same time. The socket exists as long as
- * the fingertip is there. The socket's owner and group may connect.
+/* Fingertips that `fingertip serve` shares. Each is a Unix socket SERIAL.sock, with the link SERIAL.port beside it to its serial port, if
+ * it has one. A connection to the socket is a line to the fingertip (PROTOCOL.md), which others share at the same time. The socket exists
+ * as long as the fingertip is there. The socket's owner and group may connect.
  *
  * They are in the folder of the server: $XDG_RUNTIME_DIR/fingertip; without that variable
  * /run/fingertip for root and /tmp/fingertip-UID for others. All look into /run/fingertip too. */
@@ -34,8 +33,7 @@ void make_own_folder(const std::string &path);
 
 /* Where `fingertip simulate` has its ports left, right and gripper: a folder in the own one. */
 std::string simulated_folder();
-/* "sim:left" is the port left in it, "sim:" the same; any other path stays as it is. Throws Error:
- * nothing is simulated there. */
+/* "sim:left" is the port left in it, "sim:" the same; any other path stays as it is. Throws Error: nothing is simulated there. */
 std::string port_of(const std::string &path);
 
 std::string share_socket_name(const std::string &serial);
@@ -52,8 +50,7 @@ public:
   explicit SocketTransport(const std::string &path);
   bool reopen() override;
   /* Throws Error also where the server is full. */
-  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
-              std::chrono::milliseconds timeout) override;
+  Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length, std::chrono::milliseconds timeout) override;
   /* The server serves a fingertip that does not speak this version of the protocol. */
   bool ask_loader() override;
 

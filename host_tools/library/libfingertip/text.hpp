@@ -25,8 +25,7 @@ std::optional<std::int64_t> to_i64(std::string_view text);
 std::vector<std::string_view> split(std::string_view text, char separator);
 std::string_view trim(std::string_view text);
 /* The first for which is_it holds, else nullptr. */
-template <typename Range, typename IsIt>
-auto find_in(Range &range, const IsIt &is_it) -> decltype(&*std::begin(range)) {
+template <typename Range, typename IsIt> auto find_in(Range &range, const IsIt &is_it) -> decltype(&*std::begin(range)) {
   for (auto &each : range) {
     if (is_it(each)) {
       return &each;
@@ -36,8 +35,7 @@ auto find_in(Range &range, const IsIt &is_it) -> decltype(&*std::begin(range)) {
 }
 
 /* What text_of makes of each. */
-template <typename Range, typename TextOf>
-std::vector<std::string> texts_of(const Range &range, const TextOf &text_of) {
+template <typename Range, typename TextOf> std::vector<std::string> texts_of(const Range &range, const TextOf &text_of) {
   std::vector<std::string> all;
   for (const auto &each : range) {
     all.push_back(text_of(each));
@@ -58,8 +56,7 @@ std::string joined(const Range &range, const char *separator, const TextOf &text
   }
   return all;
 }
-/* For names that others chose, in one line and harmless to a terminal: control characters, and
- * what is no UTF-8, as \x1b. */
+/* For names that others chose, in one line and harmless to a terminal: control characters, and what is no UTF-8, as \x1b. */
 std::string printable(std::string_view text);
 std::string hex(const std::vector<std::uint8_t> &bytes);
 

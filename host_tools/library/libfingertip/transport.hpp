@@ -22,10 +22,8 @@ public:
 
   virtual ~Transport() = default;
 
-  /* Waits at most this long for the first byte. Throws Error only where waiting for the other end
-   * to come back could not help. */
-  virtual Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
-                      std::chrono::milliseconds timeout) = 0;
+  /* Waits at most this long for the first byte. Throws Error only where waiting for the other end to come back could not help. */
+  virtual Result read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length, std::chrono::milliseconds timeout) = 0;
 
   /* Writes all of the bytes, or returns false: the other end is gone or takes nothing. */
   virtual bool write(const std::uint8_t *bytes, std::size_t length) = 0;

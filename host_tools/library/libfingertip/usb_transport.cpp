@@ -73,9 +73,7 @@ Layout layout_of(libusb_device *device) {
   return layout;
 }
 
-std::string failure(const std::string &serial, const std::string &what) {
-  return (serial.empty() ? "usb" : "usb " + serial) + ": " + what;
-}
+std::string failure(const std::string &serial, const std::string &what) { return (serial.empty() ? "usb" : "usb " + serial) + ": " + what; }
 
 } // namespace
 
@@ -146,8 +144,8 @@ public:
 
   bool write(const std::uint8_t *bytes, std::size_t length) {
     int sent = 0;
-    int result = libusb_bulk_transfer(handle_, layout_.out, const_cast<std::uint8_t *>(bytes), static_cast<int>(length),
-                                      &sent, WRITE_TIMEOUT_ms);
+    int result =
+        libusb_bulk_transfer(handle_, layout_.out, const_cast<std::uint8_t *>(bytes), static_cast<int>(length), &sent, WRITE_TIMEOUT_ms);
     gone_ = gone_ || result == LIBUSB_ERROR_NO_DEVICE;
     if (result == LIBUSB_ERROR_PIPE) {
       libusb_clear_halt(handle_, layout_.out);
@@ -209,8 +207,7 @@ private:
       handle_ = handle;
       layout_ = layout_of(list[i]);
       char place[32];
-      std::snprintf(place, sizeof place, "usb %03u/%03u ", libusb_get_bus_number(list[i]),
-                    libusb_get_device_address(list[i]));
+      std::snprintf(place, sizeof place, "usb %03u/%03u ", libusb_get_bus_number(list[i]), libusb_get_device_address(list[i]));
       description_ = place + here;
     }
     if (count >= 0) {
@@ -233,17 +230,11 @@ private:
         result = libusb_claim_interface(handle_, interface);
       }
       switch (result) {
-      case 0:
-        claimed_.push_back(interface);
-        break;
+      case 0: claimed_.push_back(interface); break;
       case LIBUSB_ERROR_NO_DEVICE:
-      case LIBUSB_ERROR_NOT_FOUND:
-        return false;
-      case LIBUSB_ERROR_BUSY:
-        throw Error(ErrorCode::port_in_use, description_ + ": in use by another program");
-      default:
-        throw Error(ErrorCode::usb_failed,
-                    description_ + ": cannot claim its interfaces (" + libusb_error_name(result) + ")");
+      case LIBUSB_ERROR_NOT_FOUND: return false;
+      case LIBUSB_ERROR_BUSY: throw Error(ErrorCode::port_in_use, description_ + ": in use by another program");
+      default: throw Error(ErrorCode::usb_failed, description_ + ": cannot claim its interfaces (" + libusb_error_name(result) + ")");
       }
     }
     return true;
@@ -256,8 +247,8 @@ private:
       if (!slot.transfer) {
         throw Error(ErrorCode::usb_failed, description_ + ": no memory for its transfers");
       }
-      libusb_fill_bulk_transfer(slot.transfer, handle_, layout_.in, slot.buffer.data(),
-                                static_cast<int>(slot.buffer.size()), received, &slot, 0);
+      libusb_fill_bulk_transfer(slot.transfer, handle_, layout_.in, slot.buffer.data(), static_cast<int>(slot.buffer.size()), received,
+                                &slot, 0);
       submit(slot);
     }
     if (!set_baud(BAUD) || !set_lines(DTR_AND_RTS)) {
@@ -291,17 +282,10 @@ private:
       link.halts_ = 0;
       link.submit(slot);
       break;
-    case LIBUSB_TRANSFER_TIMED_OUT:
-      link.submit(slot);
-      break;
-    case LIBUSB_TRANSFER_CANCELLED:
-      break;
-    case LIBUSB_TRANSFER_STALL:
-      link.halted_ = true;
-      break;
-    default:
-      link.gone_ = true;
-      break;
+    case LIBUSB_TRANSFER_TIMED_OUT: link.submit(slot); break;
+    case LIBUSB_TRANSFER_CANCELLED: break;
+    case LIBUSB_TRANSFER_STALL: link.halted_ = true; break;
+    default: link.gone_ = true; break;
     }
   }
 
@@ -318,8 +302,7 @@ private:
 
   bool set_lines(std::uint16_t lines) {
     return libusb_control_transfer(handle_, TO_INTERFACE, SET_CONTROL_LINE_STATE, lines,
-                                   static_cast<std::uint16_t>(layout_.control_interface), nullptr, 0,
-                                   CONTROL_TIMEOUT_ms) == 0;
+                                   static_cast<std::uint16_t>(layout_.control_interface), nullptr, 0, CONTROL_TIMEOUT_ms) == 0;
   }
 
   bool set_baud(std::uint32_t baud) {
@@ -329,9 +312,8 @@ private:
       coding[i] = static_cast<unsigned char>(baud >> 8 * i);
     }
     coding[6] = 8;
-    return libusb_control_transfer(handle_, TO_INTERFACE, SET_LINE_CODING, 0,
-                                   static_cast<std::uint16_t>(layout_.control_interface), coding.data(),
-                                   static_cast<std::uint16_t>(coding.size()),
+    return libusb_control_transfer(handle_, TO_INTERFACE, SET_LINE_CODING, 0, static_cast<std::uint16_t>(layout_.control_interface),
+                                   coding.data(), static_cast<std::uint16_t>(coding.size()),
                                    CONTROL_TIMEOUT_ms) == static_cast<int>(coding.size());
   }
 
@@ -395,8 +377,7 @@ UsbTransport::UsbTransport(const std::string &serial) : serial_(serial) {
 
 UsbTransport::~UsbTransport() = default;
 
-Transport::Result UsbTransport::read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length,
-                                     milliseconds timeout) {
+Transport::Result UsbTransport::read(std::uint8_t *bytes, std::size_t capacity, std::size_t *length, milliseconds timeout) {
   *length = 0;
   auto deadline = host_now() + timeout;
   while (link_) {
@@ -428,9 +409,7 @@ bool UsbTransport::reopen() {
 
 bool UsbTransport::ask_loader() { return link_ && link_->ask_loader(); }
 
-std::vector<pollfd> UsbTransport::poll_descriptors() const {
-  return link_ ? link_->poll_descriptors() : std::vector<pollfd>();
-}
+std::vector<pollfd> UsbTransport::poll_descriptors() const { return link_ ? link_->poll_descriptors() : std::vector<pollfd>(); }
 
 std::string UsbTransport::description() const { return link_ ? link_->description() : "usb " + serial_; }
 

@@ -51,12 +51,10 @@ Wave solution(int n, double kz, double kh, double b) {
 // A layer (layer.hpp) with one point of its base lifted. The base moves by a unit of volume (1
 // mm^3) upwards at r = 0 and nowhere else. The surface is free.
 //
-// Betti's theorem: the surface's displacement there is the pressure of that point of the base per
-// force on the surface (block.hpp). This is the stress inside. An infinite layer holds
-// itself with that stress. A block with free sides lacks it.
+// Betti's theorem: the surface's displacement there is the pressure of that point of the base per force on the surface (block.hpp). This is
+// the stress inside. An infinite layer holds itself with that stress. A block with free sides lacks it.
 //
-// Waves of a lift exp(i k . x) have two parts. The first is the displacement of a half-space above
-// the base, in closed form,
+// Waves of a lift exp(i k . x) have two parts. The first is the displacement of a half-space above the base, in closed form,
 //   u_z = (1 + k z / b) exp(-k z),  u_r = -k z / b exp(-k z),  b = 3 - 4 nu
 // The rest has no displacement at the base, and takes the stress from the surface: (1, -+1) exp(-+k z) and the terms of
 // Papkovich and Neuber, with four constants for each k. The rest falls as exp(-k h), so its integrals over k are short.
@@ -64,8 +62,7 @@ class PointLift {
 public:
   // At these heights above the base (0..thickness), for distances from r_min_mm to r_max_mm.
   PointLift(const Layer &layer, std::vector<double> heights_mm, double r_max_mm)
-      : poisson_(layer.poisson), heights_mm_(std::move(heights_mm)),
-        distances_(static_cast<std::size_t>(r_max_mm / STEP_mm) + 4) {
+      : poisson_(layer.poisson), heights_mm_(std::move(heights_mm)), distances_(static_cast<std::size_t>(r_max_mm / STEP_mm) + 4) {
     const double h = layer.thickness_mm, b = 3.0 - 4.0 * poisson_;
     const double lame = 2.0 * poisson_ / (1.0 - 2.0 * poisson_); // per shear modulus
     const double k_end = H_END / h;
@@ -79,9 +76,7 @@ public:
       const double k = half * (2.0 * static_cast<double>(n / 8) + 1.0 + sign * POINT[q % 4]);
       const double kh = k * h;
       // Free of stress at the surface, with the half-space's; held at the base.
-      const auto stresses = [&](const Wave &wave) {
-        return std::pair{lame * (wave.dw - wave.u) + 2.0 * wave.dw, wave.du + wave.w};
-      };
+      const auto stresses = [&](const Wave &wave) { return std::pair{lame * (wave.dw - wave.u) + 2.0 * wave.dw, wave.du + wave.w}; };
       Eigen::Matrix4d conditions;
       for (int c = 0; c < 4; c++) {
         const Wave base = solution(c, 0.0, kh, b), top = solution(c, kh, kh, b);
@@ -89,8 +84,7 @@ public:
         conditions.col(c) << base.u, base.w, normal, tangential;
       }
       const auto [normal, tangential] = stresses(solution(1, kh, kh, b));
-      const Eigen::Vector4d amount =
-          conditions.fullPivLu().solve(Eigen::Vector4d(0.0, 0.0, -normal / b, -tangential / b));
+      const Eigen::Vector4d amount = conditions.fullPivLu().solve(Eigen::Vector4d(0.0, 0.0, -normal / b, -tangential / b));
       const double weight = half * WEIGHT[q % 4] * k * k / (2.0 * M_PI);
       k_of[n] = k;
       for (Eigen::Index z = 0; z < heights; z++) {
@@ -231,8 +225,7 @@ public:
     const auto above = std::upper_bound(edges_.begin() + 1, edges_.end() - 1, place);
     const double begin = *(above - 1), half = 0.5 * (*above - begin);
     Vector made = Vector::Zero(size());
-    made.segment((above - 1 - edges_.begin()) * degree_, degree_ + 1) =
-        lagrange(nodes_, (place - begin) / half - 1.0, false);
+    made.segment((above - 1 - edges_.begin()) * degree_, degree_ + 1) = lagrange(nodes_, (place - begin) / half - 1.0, false);
     return made;
   }
 
@@ -275,8 +268,7 @@ void along_x(const Matrix &by, const Shape &from, const Vector &in, Vector &out,
   if (!add) {
     out.setZero(by.rows() * from.y * from.z);
   }
-  Eigen::Map<Matrix>(out.data(), by.rows(), from.y * from.z).noalias() +=
-      by * Eigen::Map<const Matrix>(in.data(), from.x, from.y * from.z);
+  Eigen::Map<Matrix>(out.data(), by.rows(), from.y * from.z).noalias() += by * Eigen::Map<const Matrix>(in.data(), from.x, from.y * from.z);
 }
 
 void along_y(const Matrix &by, const Shape &from, const Vector &in, Vector &out, bool add) {
@@ -304,9 +296,8 @@ class Quarter {
 public:
   Quarter(const Line &x, const Line &y, const Line &z, bool odd_x, bool odd_y, double lame)
       : lame_(lame), x_{Modes(x, !odd_x), Modes(x, odd_x)}, y_{Modes(y, !odd_y), Modes(y, odd_y)}, z_(z, true),
-        gx_(slopes_by_values(x, x_[0], x_[1])), hx_(slopes_by_values(x, x_[1], x_[0]).transpose()),
-        gy_(slopes_by_values(y, y_[0], y_[1])), hy_(slopes_by_values(y, y_[1], y_[0]).transpose()),
-        gz_(slopes_by_values(z, z_, z_)) {
+        gx_(slopes_by_values(x, x_[0], x_[1])), hx_(slopes_by_values(x, x_[1], x_[0]).transpose()), gy_(slopes_by_values(y, y_[0], y_[1])),
+        hy_(slopes_by_values(y, y_[1], y_[0]).transpose()), gz_(slopes_by_values(z, z_, z_)) {
     for (std::size_t c = 0; c < 3; c++) {
       const Shape s = shape(c);
       diagonal_[c].resize(s.x * s.y * s.z);
@@ -381,8 +372,8 @@ private:
   }
 
   // Along the axis of the component, by the matrix of that axis.
-  static void along(std::size_t c, const Matrix &by_x, const Matrix &by_y, const Matrix &by_z, const Vector &in,
-                    const Shape &from, Vector &out, bool add) {
+  static void along(std::size_t c, const Matrix &by_x, const Matrix &by_y, const Matrix &by_z, const Vector &in, const Shape &from,
+                    Vector &out, bool add) {
     if (c == 0) {
       along_x(by_x, from, in, out, add);
     } else if (c == 1) {
@@ -505,11 +496,10 @@ private:
       for (std::size_t c = 0; c < 3; c++) {
         const Shape s = quarter.shape(c);
         const Modes &modes = of_x ? quarter.y_of(c) : quarter.x_of(c);
-        const Matrix projected = (along.values() * modes.modes).transpose() * along.weights().asDiagonal() *
-                                 traction[c] * z_.weights().asDiagonal() * (z_.values() * quarter.z_of().modes);
+        const Matrix projected = (along.values() * modes.modes).transpose() * along.weights().asDiagonal() * traction[c] *
+                                 z_.weights().asDiagonal() * (z_.values() * quarter.z_of().modes);
         const Line &across = of_x ? x_ : y_;
-        const Vector end =
-            (of_x ? quarter.x_of(c) : quarter.y_of(c)).modes.transpose() * across.values_at(across.end());
+        const Vector end = (of_x ? quarter.x_of(c) : quarter.y_of(c)).modes.transpose() * across.values_at(across.end());
         for (Index k = 0; k < s.z; k++) {
           Eigen::Map<Matrix> layer(made[c].data() + k * s.x * s.y, s.x, s.y);
           if (of_x) {
@@ -541,12 +531,11 @@ Cubic cubic_at(double at, int nodes) {
 
 int block_nodes(double half_mm, double step_mm) { return static_cast<int>(std::ceil(2.0 * half_mm / step_mm)) + 1; }
 
-std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place> &places, double step_mm,
-                                     const BlockGrid &grid, const std::function<void(double)> &on_progress) {
+std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place> &places, double step_mm, const BlockGrid &grid,
+                                     const std::function<void(double)> &on_progress) {
   double reach_mm = 0.0;
   for (const Place &place : places) {
-    reach_mm =
-        std::max(reach_mm, std::hypot(block.half_x_mm + std::abs(place.x_mm), block.half_y_mm + std::abs(place.y_mm)));
+    reach_mm = std::max(reach_mm, std::hypot(block.half_x_mm + std::abs(place.x_mm), block.half_y_mm + std::abs(place.y_mm)));
   }
   const BlockSolver solver(block, grid, reach_mm);
   const int nodes_x = block_nodes(block.half_x_mm, step_mm);

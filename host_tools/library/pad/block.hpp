@@ -7,10 +7,9 @@
 // point itself, where all is singular, is not in the equations. The remainder is smooth except at the edges along the
 // base, where held rubber and free rubber meet (displacement there goes with the distance to the power of 0.6).
 //
-// Elements have a high degree, on a grid of lines that is dense at the sides and the base. At
-// degree 6 rubber of nu = 0.49 does not lock. Each displacement is written in products of the three
-// lines' own modes. In these all but the coupling of the three displacements is diagonal. Conjugate
-// gradients do the rest. Symmetry leaves a quarter of the block, four times.
+// Elements have a high degree, on a grid of lines that is dense at the sides and the base. At degree 6 rubber of nu = 0.49 does not lock.
+// Each displacement is written in products of the three lines' own modes. In these all but the coupling of the three displacements is
+// diagonal. Conjugate gradients do the rest. Symmetry leaves a quarter of the block, four times.
 //
 // Cost of six points on two processors: 2 s for 12 mm and 9 mm beyond the outer sensors, 31 s for 4 mm and 20 mm. Error
 // against smaller elements of a higher degree, anywhere on the surface, in parts of the layer's peak under that load:
@@ -64,10 +63,9 @@ Cubic cubic_at(double at, int nodes);
 // Lines from -half_mm to half_mm, at most step_mm apart.
 int block_nodes(double half_mm, double step_mm);
 
-// For each place on the base; one closer than 3 mm to a side asks for smaller elements. Runs on all
-// processors. on_progress gets the share done, 0..1, on any of the threads but never twice at once.
-// Throws std::runtime_error if conjugate gradients do not end.
-std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place> &places, double step_mm,
-                                     const BlockGrid &grid = {}, const std::function<void(double)> &on_progress = {});
+// For each place on the base; one closer than 3 mm to a side asks for smaller elements. Runs on all processors. on_progress gets the share
+// done, 0..1, on any of the threads but never twice at once. Throws std::runtime_error if conjugate gradients do not end.
+std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place> &places, double step_mm, const BlockGrid &grid = {},
+                                     const std::function<void(double)> &on_progress = {});
 
 } // namespace fingertip::twin

@@ -20,9 +20,9 @@ constexpr double SPREAD = 0.5;
 static std::string key_of(const Block &block, const std::vector<Place> &places) {
   const BlockGrid grid;
   char text[256];
-  std::snprintf(text, sizeof text, "block-table %d: %.9g %.9g %.9g %.9g grid %d %.9g %.9g %.9g %.9g step %.9g at",
-                VERSION, block.layer.thickness_mm, block.layer.poisson, block.half_x_mm, block.half_y_mm, grid.degree,
-                grid.element_mm, grid.element_thicknesses, grid.edge_thicknesses, grid.growth, STEP_mm);
+  std::snprintf(text, sizeof text, "block-table %d: %.9g %.9g %.9g %.9g grid %d %.9g %.9g %.9g %.9g step %.9g at", VERSION,
+                block.layer.thickness_mm, block.layer.poisson, block.half_x_mm, block.half_y_mm, grid.degree, grid.element_mm,
+                grid.element_thicknesses, grid.edge_thicknesses, grid.growth, STEP_mm);
   std::string key = text;
   for (const Place &place : places) {
     std::snprintf(text, sizeof text, " %.9g,%.9g", place.x_mm, place.y_mm);
@@ -41,8 +41,7 @@ BlockTable::BlockTable(const Block &block, const std::vector<Place> &sensors) : 
     const Place mirror{std::abs(sensor.x_mm), std::abs(sensor.y_mm)};
     const auto same = [&](const Place &place) { return place.x_mm == mirror.x_mm && place.y_mm == mirror.y_mm; };
     const auto found = std::find_if(places_.begin(), places_.end(), same);
-    sensors_.push_back({static_cast<std::size_t>(found - places_.begin()), sensor.x_mm < 0.0 ? -1.0 : 1.0,
-                        sensor.y_mm < 0.0 ? -1.0 : 1.0});
+    sensors_.push_back({static_cast<std::size_t>(found - places_.begin()), sensor.x_mm < 0.0 ? -1.0 : 1.0, sensor.y_mm < 0.0 ? -1.0 : 1.0});
     if (found == places_.end()) {
       places_.push_back(mirror);
     }
@@ -52,13 +51,11 @@ BlockTable::BlockTable(const Block &block, const std::vector<Place> &sensors) : 
   values_.resize(3 * places_.size() * std::size_t(nodes_x_) * std::size_t(nodes_y_));
 }
 
-BlockTable BlockTable::load_or_build(const Block &block, const std::vector<Place> &sensors,
-                                     const std::filesystem::path &cache_directory,
+BlockTable BlockTable::load_or_build(const Block &block, const std::vector<Place> &sensors, const std::filesystem::path &cache_directory,
                                      const std::function<void(double)> &on_progress) {
   BlockTable table(block, sensors);
   char name[64];
-  std::snprintf(name, sizeof name, "block%gx%g-h%g", 2.0 * block.half_x_mm, 2.0 * block.half_y_mm,
-                block.layer.thickness_mm);
+  std::snprintf(name, sizeof name, "block%gx%g-h%g", 2.0 * block.half_x_mm, 2.0 * block.half_y_mm, block.layer.thickness_mm);
   const TableFile file(cache_directory, name, key_of(block, table.places_));
   if (!file.read(table.values_)) {
     table.values_.clear();

@@ -1,10 +1,8 @@
-// The difference between a block (block.hpp) and a layer without end at each sensor: the effect of
-// the pad's edges, for any load and place. It is solved once, kept in a file, and interpolated. Add
-// it to the results of contact_table.hpp and traction_table.hpp.
+// The difference between a block (block.hpp) and a layer without end at each sensor: the effect of the pad's edges, for any load and place.
+// It is solved once, kept in a file, and interpolated. Add it to the results of contact_table.hpp and traction_table.hpp.
 //
-// The load counts by its force, its place and its breadth: the field's mean over a disc, from four
-// points. Compared with all of the contact's own pressure, this costs the following, in parts of
-// the layer's peak, above the corner's sensor at 8 N on 12 mm:
+// The load counts by its force, its place and its breadth: the field's mean over a disc, from four points. Compared with all of the
+// contact's own pressure, this costs the following, in parts of the layer's peak, above the corner's sensor at 8 N on 12 mm:
 //   9 mm of rubber beyond   0.1 % under a sphere of 6 mm, 0.3 % under one of 15 mm
 //   6 mm                    0.4 and 1.2 %, 1 % under a cube
 // The middle alone costs three to five times that. Nodes 0.5 mm apart add less than 0.05 %.
@@ -25,8 +23,7 @@ public:
   // From the cache if it holds this very table, else solved (block.hpp: seconds, half a minute at
   // most) and kept there; a damaged file is solved again. on_progress gets the share done, 0..1.
   // Throws std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
-  static BlockTable load_or_build(const Block &block, const std::vector<Place> &sensors,
-                                  const std::filesystem::path &cache_directory,
+  static BlockTable load_or_build(const Block &block, const std::vector<Place> &sensors, const std::filesystem::path &cache_directory,
                                   const std::function<void(double)> &on_progress = {});
 
   struct Load {

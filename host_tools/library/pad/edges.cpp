@@ -51,8 +51,7 @@ public:
   Estimate(const pad_profile &profile, const wire_info &info) : profile_(profile), info_(info) {
     if (fit_array_init(&array_, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) != FT_OK ||
         fit_pad_init(&pad_, &array_, &profile) != FT_OK) {
-      throw Error(ErrorCode::bad_value,
-                  "the fingertip's sensors are no rectangle that tangential force is estimated on");
+      throw Error(ErrorCode::bad_value, "the fingertip's sensors are no rectangle that tangential force is estimated on");
     }
     settings_.iterations = 4;
     settings_.noise_Pa_q10 = 1024;
@@ -71,16 +70,15 @@ public:
         squares += bell * bell;
       }
     }
-    settings_.dip_share =
-        static_cast<float>(std::clamp(products / squares, 0.0, info_.calibration.dip_share_q16 / 65536.0));
+    settings_.dip_share = static_cast<float>(std::clamp(products / squares, 0.0, info_.calibration.dip_share_q16 / 65536.0));
   }
 
   // False: there is no estimate.
   bool of_contact(Contact &contact, const twin::BlockTable &block) {
     std::array<std::int32_t, FT_MAX_SENSORS> readings{};
     for (std::size_t k = 0; k < info_.sensor_count; k++) {
-      const double layer = FORCE_N * layer_Pa(profile_, contact.qx, contact.qy, of(info_.x_mm[k]) - contact.x_mm,
-                                              of(info_.y_mm[k]) - contact.y_mm);
+      const double layer =
+          FORCE_N * layer_Pa(profile_, contact.qx, contact.qy, of(info_.x_mm[k]) - contact.x_mm, of(info_.y_mm[k]) - contact.y_mm);
       const twin::BlockTable::Load load{FORCE_N, contact.qx * FORCE_N, contact.qy * FORCE_N, radius_mm()};
       const double added = block.added_Pa(k, load, contact.x_mm, contact.y_mm);
       readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * (layer + added)));
@@ -122,8 +120,7 @@ Terms row_at(const Contact &contact) {
 }
 
 // Least squares of value_i = factor_i even(c) over contacts, by the estimated location.
-template <typename Factor, typename Value>
-Terms fitted(const std::vector<Contact> &contacts, const Factor &factor, const Value &value) {
+template <typename Factor, typename Value> Terms fitted(const std::vector<Contact> &contacts, const Factor &factor, const Value &value) {
   Eigen::MatrixXd rows(contacts.size(), PAD_EDGE_TERMS);
   Eigen::VectorXd right(contacts.size());
   for (std::size_t i = 0; i < contacts.size(); i++) {
@@ -214,11 +211,9 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std:
   }
   const AxisTerms x = terms_along(ALONG_X, contacts[0], contacts[1]);
   const AxisTerms y = terms_along(ALONG_Y, contacts[0], contacts[2]);
-  const double usual =
-      calibrated ? forces / static_cast<double>(contacts[0].size()) : 1.0; // in the calibration's scale
+  const double usual = calibrated ? forces / static_cast<double>(contacts[0].size()) : 1.0; // in the calibration's scale
   const Terms force = fitted(
-      contacts[0], [](const Contact &) { return 1.0; },
-      [&](const Contact &c) { return c.estimated_force / usual - 1.0; });
+      contacts[0], [](const Contact &) { return 1.0; }, [&](const Contact &c) { return c.estimated_force / usual - 1.0; });
   pad_edges edges{};
   put(x.ratio, edges.ratio_x);
   put(y.ratio, edges.ratio_y);

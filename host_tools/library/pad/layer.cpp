@@ -17,9 +17,7 @@ static double denominator(double H, double poisson) {
   return (3.0 - 4.0 * poisson) * cosh * cosh + H * H + b * b;
 }
 
-double youngs_modulus_Pa(double shore_a) {
-  return 1e6 * 0.0981 * (56.0 + 7.62336 * shore_a) / (0.137505 * (254.0 - 2.54 * shore_a));
-}
+double youngs_modulus_Pa(double shore_a) { return 1e6 * 0.0981 * (56.0 + 7.62336 * shore_a) / (0.137505 * (254.0 - 2.54 * shore_a)); }
 
 Layer silicone(double thickness_mm) { return {thickness_mm, youngs_modulus_Pa(SHORE_A), POISSON}; }
 
@@ -36,9 +34,7 @@ double tangential_share(double H, double poisson) {
   return (H + (1.0 - 2.0 * poisson) * sinh_per_cosh) / (2.0 * (1.0 - poisson) + H * sinh_per_cosh);
 }
 
-double tangential_transfer(double H, double poisson) {
-  return base_transfer(H, poisson) * tangential_share(H, poisson);
-}
+double tangential_transfer(double H, double poisson) { return base_transfer(H, poisson) * tangential_share(H, poisson); }
 
 double surface_compliance(double H, double poisson) {
   if (H > H_LARGE) {

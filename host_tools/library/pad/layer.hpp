@@ -1,5 +1,4 @@
-// A rubber layer bonded to a rigid base, loaded on its surface: linear elasticity at small strain,
-// laterally without end.
+// A rubber layer bonded to a rigid base, loaded on its surface: linear elasticity at small strain, laterally without end.
 //
 // In wave numbers the layer answers each wave of the surface's load by itself. With H = k h and
 //   D = (3-4nu) cosh^2 H + H^2 + (1-2nu)^2:
@@ -11,10 +10,9 @@
 //
 // A tangential traction t on the rubber, waves exp(i k . x), makes the base pressure
 //   -i (k . t / |k|) Q(H),  Q(H) = 2 (1-nu) [H cosh H + (1-2nu) sinh H] / D
-// Only the part of t along k makes pressure. The other part shears the layer and presses nowhere,
-// so the base does not feel torsion. Q(H) tends to H for long waves: the base carries the moment of
-// t about itself, with more pressure ahead of it, as much less behind, and no force. (Plane or
-// axisymmetric Navier equations with u = 0 at z = 0; the tests solve them numerically.)
+// Only the part of t along k makes pressure. The other part shears the layer and presses nowhere, so the base does not feel torsion. Q(H)
+// tends to H for long waves: the base carries the moment of t about itself, with more pressure ahead of it, as much less behind, and no
+// force. (Plane or axisymmetric Navier equations with u = 0 at z = 0; the tests solve them numerically.)
 //
 // Left out: the pad's edges (block.hpp), large strain, the sensors' own stiffness in the base, and time (effects.hpp).
 #pragma once

@@ -21,11 +21,9 @@ namespace {
 struct Term {
   double strength, sd;
 };
-constexpr Term NORMAL[PAD_NORMAL_TERMS] = {{0.095232207857486567, 0.29617093376692155},
-                                           {0.82159742314719264, 0.47811810687346074}};
-constexpr Term TANGENTIAL[PAD_TANGENTIAL_TERMS] = {{0.093594210994422417, 0.40447100259126512},
-                                                   {0.33589670928222154, 0.66593960858520174},
-                                                   {0.46353010342238155, 1.6991808512232462}};
+constexpr Term NORMAL[PAD_NORMAL_TERMS] = {{0.095232207857486567, 0.29617093376692155}, {0.82159742314719264, 0.47811810687346074}};
+constexpr Term TANGENTIAL[PAD_TANGENTIAL_TERMS] = {
+    {0.093594210994422417, 0.40447100259126512}, {0.33589670928222154, 0.66593960858520174}, {0.46353010342238155, 1.6991808512232462}};
 
 // Pressure of 1 N, pascals, so far from the contact's centre.
 double pressure_Pa(const pad_profile &profile, double r2_mm2) {
@@ -65,8 +63,7 @@ double force_ratio(const pad_profile &profile, const wire_info &info) {
     for (std::size_t k = 0; k < info.sensor_count; k++) {
       const double dx = static_cast<double>(info.x_mm[k]) - at_x_mm;
       const double dy = static_cast<double>(info.y_mm[k]) - at_y_mm;
-      pressures_Pa_q10[k] =
-          static_cast<std::int32_t>(std::lround(1024 * FORCE_N * pressure_Pa(profile, dx * dx + dy * dy)));
+      pressures_Pa_q10[k] = static_cast<std::int32_t>(std::lround(1024 * FORCE_N * pressure_Pa(profile, dx * dx + dy * dy)));
     }
     fit_result fit;
     fit_gaussian(&array, pressures_Pa_q10.data(), UINT32_MAX >> (FT_MAX_SENSORS - info.sensor_count), &settings, &fit);
@@ -80,9 +77,8 @@ double force_ratio(const pad_profile &profile, const wire_info &info) {
 
 void check(const char *what, double value, double least, double greatest) {
   if (!(value >= least && value <= greatest)) {
-    throw Error(ErrorCode::bad_value, std::string(what) + " " + shortest(static_cast<float>(value)) +
-                                          " is out of range; give " + shortest(static_cast<float>(least)) + " to " +
-                                          shortest(static_cast<float>(greatest)) + " mm");
+    throw Error(ErrorCode::bad_value, std::string(what) + " " + shortest(static_cast<float>(value)) + " is out of range; give " +
+                                          shortest(static_cast<float>(least)) + " to " + shortest(static_cast<float>(greatest)) + " mm");
   }
 }
 
@@ -145,8 +141,7 @@ pad_profile profile_of(const Shape &shape, const wire_info &info) {
     profile.normal[j] = {static_cast<float>(NORMAL[j].strength), static_cast<float>(h_mm * NORMAL[j].sd)};
   }
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
-    profile.tangential[j] = {static_cast<float>(h_mm * TANGENTIAL[j].strength),
-                             static_cast<float>(h_mm * TANGENTIAL[j].sd)};
+    profile.tangential[j] = {static_cast<float>(h_mm * TANGENTIAL[j].strength), static_cast<float>(h_mm * TANGENTIAL[j].sd)};
   }
   // A contact of radius a under Hertz's pressure, sqrt(1 - r^2/a^2), has a variance of a^2/5 along an axis: 4 mm^2 at
   // 4.5 mm, and 10 mm^2, an sd more, at the 7 mm that a sphere of 15 mm makes under 10 N on 12 mm of silicone.
@@ -172,14 +167,12 @@ wire_info own_sensors() {
 
 pad_profile profile_over_own_sensors(const Shape &shape) { return profile_of(shape, own_sensors()); }
 
-bool edges_spoil_the_zero(const Shape &shape) {
-  return shape.overhang_mm > 0 && shape.overhang_mm < 0.5 * shape.thickness_mm;
-}
+bool edges_spoil_the_zero(const Shape &shape) { return shape.overhang_mm > 0 && shape.overhang_mm < 0.5 * shape.thickness_mm; }
 
 Thickness thickness_of(double sigma_mm, double sigma_sd_mm) {
   const double mm = thickness_mm_of(sigma_mm, SPREAD_mm2);
-  const double by_spread = 0.5 * (thickness_mm_of(sigma_mm, SPREAD_mm2 - SPREAD_SD_mm2) -
-                                  thickness_mm_of(sigma_mm, SPREAD_mm2 + SPREAD_SD_mm2));
+  const double by_spread =
+      0.5 * (thickness_mm_of(sigma_mm, SPREAD_mm2 - SPREAD_SD_mm2) - thickness_mm_of(sigma_mm, SPREAD_mm2 + SPREAD_SD_mm2));
   const double sd_mm = std::hypot(sigma_sd_mm, SESSION_SD * sigma_mm);
   const double by_width = thickness_mm_of(sigma_mm + sd_mm, SPREAD_mm2) - mm;
   return {mm, std::hypot(by_spread, by_width)};
@@ -206,16 +199,14 @@ std::optional<Thickness> thickness_for_profile(const wire_info &info, const cali
   return wants && found && profile_suits(*found) ? found : std::nullopt;
 }
 
-std::string text_of(const Thickness &thickness) {
-  return fixed(thickness.mm, 1) + " mm, sd " + fixed(thickness.sd_mm, 1);
-}
+std::string text_of(const Thickness &thickness) { return fixed(thickness.mm, 1) + " mm, sd " + fixed(thickness.sd_mm, 1); }
 
 std::string disagreement(const Thickness &found, double set_mm) {
   if (found.agrees_with(set_mm)) {
     return {};
   }
-  return "the profile is of " + fixed(set_mm, 1) + " mm of rubber, but the calibration's width is that of " +
-         text_of(found) + ": with a wrong thickness the tangential force and the place are off, or there are none";
+  return "the profile is of " + fixed(set_mm, 1) + " mm of rubber, but the calibration's width is that of " + text_of(found) +
+         ": with a wrong thickness the tangential force and the place are off, or there are none";
 }
 
 } // namespace fingertip::pad

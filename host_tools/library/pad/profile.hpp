@@ -41,10 +41,9 @@ bool edges_spoil_the_zero(const Shape &shape);
 
 // The thickness of a pad's rubber, from the width of its response to a usual contact.
 //
-// The base pressure under one bonded layer is wider the thicker the layer is, in proportion for a
-// contact that is a point (pad/profile.hpp). A contact adds its own spread. So the width that a
-// calibration finds determines the thickness. It is uncertain by what is not known of the foot's spread,
-// which counts more on thin rubber: 4 % on 12 mm, some 12 % on 6 mm.
+// The base pressure under one bonded layer is wider the thicker the layer is, in proportion for a contact that is a point
+// (pad/profile.hpp). A contact adds its own spread. So the width that a calibration finds determines the thickness. It is uncertain by what
+// is not known of the foot's spread, which counts more on thin rubber: 4 % on 12 mm, some 12 % on 6 mm.
 //
 // On pads of the twin it is right within 2 % from 9 to 15 mm, with a dip or without (test unit.pad_thickness).
 struct Thickness {

@@ -21,8 +21,7 @@ static std::uint64_t fnv1a(const void *data, std::size_t length) {
 }
 
 // A file holds the key, the values, and a hash of both.
-TableFile::TableFile(const std::filesystem::path &directory, const std::string &name, std::string key)
-    : key_(std::move(key)) {
+TableFile::TableFile(const std::filesystem::path &directory, const std::string &name, std::string key) : key_(std::move(key)) {
   char hash[24];
   std::snprintf(hash, sizeof hash, "-%016llx", static_cast<unsigned long long>(fnv1a(key_.data(), key_.size())));
   path_ = directory / (name + hash + ".table");

@@ -14,8 +14,7 @@ namespace fingertip {
 using std::chrono::seconds;
 
 constexpr Hub::Client OURSELVES = 0;
-/* A fingertip answers within half a second; after this long without an answer it is asked again,
- * and has room for more commands. */
+/* A fingertip answers within half a second; after this long without an answer it is asked again, and has room for more commands. */
 constexpr seconds PATIENCE{1};
 /* Even a late answer is somebody's. */
 constexpr seconds FORGOTTEN_AFTER{10};
@@ -111,8 +110,8 @@ bool Hub::is_asked(std::uint8_t type, Time now, std::optional<Client> client) co
 }
 
 bool Hub::takes_commands(Time now) const {
-  auto unanswered = std::count_if(commands_.begin(), commands_.end(),
-                                  [&](const Command &command) { return now - command.sent < PATIENCE; });
+  auto unanswered =
+      std::count_if(commands_.begin(), commands_.end(), [&](const Command &command) { return now - command.sent < PATIENCE; });
   return static_cast<std::size_t>(unanswered) < MOST_UNANSWERED;
 }
 
@@ -144,23 +143,13 @@ void Hub::take_frame(const Bytes &frame, bool joining) {
   heard_ = true;
   follow(packet->sequence());
   switch (packet->type()) {
-  case WIRE_CONTACT:
-    give_streaming(WIRE_STREAM_CONTACT, *packet);
-    break;
-  case WIRE_RAW:
-    give_streaming(WIRE_STREAM_RAW, *packet);
-    break;
-  case WIRE_ACK:
-    take_acknowledgement(std::move(*packet));
-    break;
+  case WIRE_CONTACT: give_streaming(WIRE_STREAM_CONTACT, *packet); break;
+  case WIRE_RAW: give_streaming(WIRE_STREAM_RAW, *packet); break;
+  case WIRE_ACK: take_acknowledgement(std::move(*packet)); break;
   case WIRE_INFO:
   case WIRE_HEALTH:
-  case WIRE_CRASH:
-    take_answer(std::move(*packet));
-    break;
-  default: /* of a later firmware */
-    give_streaming(0xFF, *packet);
-    break;
+  case WIRE_CRASH: take_answer(std::move(*packet)); break;
+  default: /* of a later firmware */ give_streaming(0xFF, *packet); break;
   }
 }
 
@@ -263,9 +252,7 @@ void Hub::give_all(const Bytes &frame) {
   }
 }
 
-bool Hub::has_room(const ClientState &state, std::size_t length) const {
-  return state.queue.size() - state.taken + length <= queue_bytes_;
-}
+bool Hub::has_room(const ClientState &state, std::size_t length) const { return state.queue.size() - state.taken + length <= queue_bytes_; }
 
 Bytes Hub::take_for_line() { return std::exchange(for_line_, {}); }
 

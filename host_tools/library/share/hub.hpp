@@ -1,6 +1,5 @@
-/* One fingertip for many programs. The hub passes its packets to the clients that they
- * concern, and the clients' commands to its line. To each client the hub is a fingertip of its own
- * (PROTOCOL.md). Nothing is read, written or waited for here.
+/* One fingertip for many programs. The hub passes its packets to the clients that they concern, and the clients' commands to its line. To
+ * each client the hub is a fingertip of its own (PROTOCOL.md). Nothing is read, written or waited for here.
  *
  * - Frames and health go to the clients that asked for them. The hub asks the fingertip for what
  *   any of them wants. A client that leaves wants nothing.

@@ -46,8 +46,7 @@ LineServer::~LineServer() {
 }
 
 void LineServer::step() {
-  for (int client; clients_.size() < MOST_CLIENTS &&
-                   (client = accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
+  for (int client; clients_.size() < MOST_CLIENTS && (client = accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
     clients_[client];
   }
   for (auto client = clients_.begin(); client != clients_.end();) {

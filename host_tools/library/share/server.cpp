@@ -33,8 +33,7 @@ constexpr milliseconds TICK{500};
 constexpr milliseconds LAST_PACKETS{2000};
 /* At once from one line, so that each gets its turn: 50 ms at the highest rate. */
 constexpr int READS_IN_A_ROW = 4;
-/* At most on one fingertip: with sixteen of these the process is still within 1024 descriptors,
- * which is what systems allow by default. */
+/* At most on one fingertip: with sixteen of these the process is still within 1024 descriptors, which is what systems allow by default. */
 constexpr std::size_t MOST_CLIENTS = 60;
 /* Bytes taken of a client at once: some dozen commands. */
 constexpr std::size_t CLIENT_BYTES = 256;
@@ -111,9 +110,8 @@ public:
     mode_t before = umask(0777);
     bool bound = bind(fd_.get(), reinterpret_cast<const sockaddr *>(&address), sizeof address) == 0;
     umask(before);
-    if (!bound || (group && chown(early.c_str(), static_cast<uid_t>(-1), *group) != 0) ||
-        chmod(early.c_str(), SOCKET_MODE) != 0 || listen(fd_.get(), BACKLOG) != 0 ||
-        rename(early.c_str(), path_.c_str()) != 0) {
+    if (!bound || (group && chown(early.c_str(), static_cast<uid_t>(-1), *group) != 0) || chmod(early.c_str(), SOCKET_MODE) != 0 ||
+        listen(fd_.get(), BACKLOG) != 0 || rename(early.c_str(), path_.c_str()) != 0) {
       Error error = cannot_share(path_);
       unlink(early.c_str());
       throw error;
@@ -286,9 +284,8 @@ private:
         hub_->leave(each.client);
       }
     }
-    connections_.erase(
-        std::remove_if(connections_.begin(), connections_.end(), [](const Connection &each) { return each.over; }),
-        connections_.end());
+    connections_.erase(std::remove_if(connections_.begin(), connections_.end(), [](const Connection &each) { return each.over; }),
+                       connections_.end());
   }
 
   void report_losses(Connection &connection, bool finally) {
@@ -350,9 +347,9 @@ private:
       auto taken = static_cast<std::ptrdiff_t>(sent.value_or(each.rest.size()));
       each.rest.erase(each.rest.begin(), each.rest.begin() + taken);
     }
-    leaving_.erase(std::remove_if(leaving_.begin(), leaving_.end(),
-                                  [&](const Leaving &each) { return each.rest.empty() || now > each.until; }),
-                   leaving_.end());
+    leaving_.erase(
+        std::remove_if(leaving_.begin(), leaving_.end(), [&](const Leaving &each) { return each.rest.empty() || now > each.until; }),
+        leaving_.end());
   }
 
   /* Whatever keeps it from being opened may pass. */
@@ -399,8 +396,7 @@ private:
 
 Server::Server(const Options &options, Log log) : folder_(options.folder), group_(options.group), log_(std::move(log)) {
   make_own_folder(folder_);
-  if ((group_ && chown(folder_.c_str(), static_cast<uid_t>(-1), *group_) != 0) ||
-      chmod(folder_.c_str(), FOLDER_MODE) != 0) {
+  if ((group_ && chown(folder_.c_str(), static_cast<uid_t>(-1), *group_) != 0) || chmod(folder_.c_str(), FOLDER_MODE) != 0) {
     throw cannot_share(folder_);
   }
 }

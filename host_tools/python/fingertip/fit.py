@@ -1,7 +1,6 @@
 """Fits the pressures of any array by the firmware's own code: `fingertip fit`, which starts this.
 
-found = fingertip.fit(pressures_Pa, "2x4")
-plt.plot(found["x_mm"], found["y_mm"], ".")
+found = fingertip.fit(pressures_Pa, "2x4") plt.plot(found["x_mm"], found["y_mm"], ".")
 """
 
 import argparse

@@ -46,12 +46,10 @@ constexpr Named OWN[] = {
 
 } // namespace
 
-// kernel: of those above, or a library, which one thread at a time may call. us: of one fit, if a single thread runs
-// them.
+// kernel: of those above, or a library, which one thread at a time may call. us: of one fit, if a single thread runs them.
 static void compare(std::string kernel, std::int64_t threads, std::int64_t iterations, std::int64_t firmware_guess,
-                    Batch<const fit_array, 1> array, Batch<const double, 1> noise_Pa,
-                    Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const std::uint32_t, 1> usable,
-                    Batch<compared_fit, 1> results, Batch<double, 1> us) {
+                    Batch<const fit_array, 1> array, Batch<const double, 1> noise_Pa, Batch<const std::int32_t, 2> pressure_Pa_q10,
+                    Batch<const std::uint32_t, 1> usable, Batch<compared_fit, 1> results, Batch<double, 1> us) {
   same_length(results, pressure_Pa_q10, usable, noise_Pa);
   require(array[0].sensor_count == pressure_Pa_q10.size(1), "readings of another number of sensors");
   fitting::Solve solve = fitting::library_named(kernel);
@@ -73,15 +71,14 @@ static void compare(std::string kernel, std::int64_t threads, std::int64_t itera
 MEASURE_ENTRY(compare)
 
 using reference_fit = reference::Fit;
-MEASURE_RECORD(reference_fit, FIELD(p0_Pa), FIELD(x_mm), FIELD(y_mm), FIELD(sigma_mm), FIELD(cost), FIELD(force_N),
-               FIELD(location_sd_mm), FIELD(condition_number), FIELD(at_bound), FIELD(observable))
+MEASURE_RECORD(reference_fit, FIELD(p0_Pa), FIELD(x_mm), FIELD(y_mm), FIELD(sigma_mm), FIELD(cost), FIELD(force_N), FIELD(location_sd_mm),
+               FIELD(condition_number), FIELD(at_bound), FIELD(observable))
 
 // The optimum of presses [press][sensor]. starts [press or 0]: a further first guess. all_starts: Ceres from every
 // start. Without a positive usable reading there is none, and its location's sd is infinite.
-static void optimum(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm,
-                    Batch<const double, 2> pressure_Pa, Batch<const std::uint32_t, 1> usable,
-                    Batch<const double, 1> noise_Pa, Batch<const reference_fit, 1> starts, std::int64_t all_starts,
-                    Batch<reference_fit, 1> results) {
+static void optimum(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm, Batch<const double, 2> pressure_Pa,
+                    Batch<const std::uint32_t, 1> usable, Batch<const double, 1> noise_Pa, Batch<const reference_fit, 1> starts,
+                    std::int64_t all_starts, Batch<reference_fit, 1> results) {
   same_length(results, pressure_Pa, usable, noise_Pa);
   require(starts.size() == 0 || starts.size() == results.size(), "another number of starts");
   require(x_mm.size() == y_mm.size() && x_mm.size() == pressure_Pa.size(1), "another number of sensors");
@@ -101,8 +98,7 @@ static void optimum(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, do
     if (starts.size()) {
       start = {starts[i].p0_Pa, starts[i].x_mm, starts[i].y_mm, starts[i].sigma_mm};
     }
-    results[i] =
-        reference::fit(array, readings, usable[i], noise_Pa[i], starts.size() ? &start : nullptr, all_starts != 0);
+    results[i] = reference::fit(array, readings, usable[i], noise_Pa[i], starts.size() ? &start : nullptr, all_starts != 0);
   });
 }
 MEASURE_ENTRY(optimum)

@@ -16,8 +16,7 @@ struct KernelSettings {
   bool firmware_guess; // double_kernel alone: starts where the firmware's fit does
 };
 
-// As fit_result, in double so that a double kernel is not rounded. flags: FIT_VALID at most, for none of them judges
-// itself.
+// As fit_result, in double so that a double kernel is not rounded. flags: FIT_VALID at most, for none of them judges itself.
 struct KernelResult {
   double x_mm, y_mm, p0_Pa, sigma_mm;
   std::uint32_t flags;
@@ -36,8 +35,7 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
 // are orthogonal under gx^2 and gy^2, the Gauss-Newton basis is orthogonal, so that there is no matrix to solve, and
 // three exponentials give all eight g. The amplitude is always the best for the shape. Steps are limited as in the
 // general kernel. It stops when it has settled: settings.iterations is the most it takes.
-KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
-                       const KernelSettings &settings);
+KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable, const KernelSettings &settings);
 
 // Solvers that a host program might use instead, by name, or nullptr. Not for several threads at once: some keep their
 // workspace. They get the same scaled readings, start from the general kernel's first guess, with the analytic

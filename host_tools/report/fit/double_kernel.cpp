@@ -47,8 +47,7 @@ double best_amplitude(const Samples &samples, const Gaussian &theta) {
 }
 
 // What the firmware's fit of these readings starts from.
-Gaussian firmware_guess(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
-                        const Samples &samples) {
+Gaussian firmware_guess(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable, const Samples &samples) {
   fit_settings none{};
   none.noise_Pa_q10 = 1;
   fit_result result;
@@ -88,8 +87,7 @@ Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10, s
 // A paraboloid through the logarithms of the large readings, about the peak.
 Gaussian first_guess(const Samples &samples, double noise_Pa) {
   const auto first = samples.p.begin();
-  const auto peak =
-      static_cast<std::size_t>(std::max_element(first, first + static_cast<std::ptrdiff_t>(samples.count)) - first);
+  const auto peak = static_cast<std::size_t>(std::max_element(first, first + static_cast<std::ptrdiff_t>(samples.count)) - first);
   const double x_peak = samples.x[peak], y_peak = samples.y[peak];
   const double least = std::clamp(GUESS_NOISES * noise_Pa / samples.unit_Pa, GUESS_SHARE, 0.99);
   Normal normal;
@@ -104,16 +102,15 @@ Gaussian first_guess(const Samples &samples, double noise_Pa) {
   }
   const Vector4 c = normal.matrix.ldlt().solve(normal.rhs);
   const double half_inverse = 0.5 / limited(-c[3], 0.5 / (SIGMA_MAX * SIGMA_MAX), 0.5 / (0.25 * 0.25));
-  Gaussian theta{1.0, x_peak + limited(c[1] * half_inverse, -1.0, 1.0),
-                 y_peak + limited(c[2] * half_inverse, -1.0, 1.0), std::sqrt(half_inverse)};
+  Gaussian theta{1.0, x_peak + limited(c[1] * half_inverse, -1.0, 1.0), y_peak + limited(c[2] * half_inverse, -1.0, 1.0),
+                 std::sqrt(half_inverse)};
   theta.p0 = best_amplitude(samples, theta);
   return theta;
 }
 
 KernelResult in_units(const fit_array &array, const Samples &samples, const Gaussian &theta) {
   const double pitch_mm = static_cast<double>(array.pitch_mm);
-  return {theta.x * pitch_mm, theta.y * pitch_mm, theta.p0 * samples.unit_Pa, theta.sigma * pitch_mm,
-          CONTACT_FLAG_FIT_VALID};
+  return {theta.x * pitch_mm, theta.y * pitch_mm, theta.p0 * samples.unit_Pa, theta.sigma * pitch_mm, CONTACT_FLAG_FIT_VALID};
 }
 
 KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
@@ -122,8 +119,8 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
   if (samples.count < 4) {
     return {};
   }
-  Gaussian theta = settings.firmware_guess ? firmware_guess(array, pressure_Pa_q10, usable, samples)
-                                           : first_guess(samples, settings.noise_Pa);
+  Gaussian theta =
+      settings.firmware_guess ? firmware_guess(array, pressure_Pa_q10, usable, samples) : first_guess(samples, settings.noise_Pa);
   const double x_min = static_cast<double>(array.x_min), x_max = static_cast<double>(array.x_max);
   const double y_min = static_cast<double>(array.y_min), y_max = static_cast<double>(array.y_max);
   for (int i = 0; i < settings.iterations; i++) {
@@ -137,8 +134,7 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
     }
     const double gain = theta.sigma * theta.sigma / theta.p0;
     const Vector4 b = normal.matrix.ldlt().solve(normal.rhs);
-    const double excess =
-        gain * std::max({std::abs(b[1]) / MOVE_LIMIT, std::abs(b[2]) / MOVE_LIMIT, std::abs(b[3]) / WIDEN_LIMIT});
+    const double excess = gain * std::max({std::abs(b[1]) / MOVE_LIMIT, std::abs(b[2]) / MOVE_LIMIT, std::abs(b[3]) / WIDEN_LIMIT});
     const double share = excess > 1.0 ? 1.0 / excess : 1.0;
     theta.p0 = limited(theta.p0 + share * b[0], P0_MIN, P0_MAX);
     theta.x = limited(theta.x + share * gain * b[1], x_min - OVERSHOOT, x_max + OVERSHOOT);

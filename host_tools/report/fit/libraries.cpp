@@ -39,8 +39,7 @@ void evaluate(const Samples &samples, const double *theta, double *residual, dou
 using Minimise = void (*)(const Samples &samples, double theta[4]);
 
 template <Minimise MINIMISE>
-KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
-                  const KernelSettings &settings) {
+KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable, const KernelSettings &settings) {
   const Samples samples = normalise(array, pressure_Pa_q10, usable);
   if (samples.count != SENSORS) {
     return {};
@@ -98,8 +97,7 @@ void tiny_solver(const Samples &samples, double theta[4]) {
   std::copy(x.data(), x.data() + 4, theta);
 }
 
-int cminpack_function(void *context, int, int, const double *theta, double *residuals, double *jacobian, int stride,
-                      int what) {
+int cminpack_function(void *context, int, int, const double *theta, double *residuals, double *jacobian, int stride, int what) {
   const auto &samples = *static_cast<const Samples *>(context);
   if (what == 1) {
     evaluate(samples, theta, residuals, nullptr, 0, 0);
@@ -114,8 +112,7 @@ void cminpack(const Samples &samples, double theta[4]) {
   int pivots[4];
   Samples context = samples;
   const double tolerance = std::sqrt(std::numeric_limits<double>::epsilon());
-  lmder1(cminpack_function, &context, SENSORS, 4, theta, residuals, jacobian, SENSORS, tolerance, pivots, work,
-         5 * 4 + SENSORS);
+  lmder1(cminpack_function, &context, SENSORS, 4, theta, residuals, jacobian, SENSORS, tolerance, pivots, work, 5 * 4 + SENSORS);
 }
 
 } // namespace

@@ -12,8 +12,7 @@ constexpr int COLUMNS = 3, ROWS = 5;
 constexpr int FIRST_COLUMN = -(COLUMNS / 2), FIRST_ROW = -(ROWS / 2);
 constexpr double MARGIN = 1.5, OVERSHOOT = 0.25; // pitches around the array
 constexpr double MOVE_LIMIT = 0.65, WIDEN_LIMIT = 0.5;
-// 1 / (2 sigma^2) of the widest and the narrowest sigma, pitches; with six nodes the squares of the
-// exponentials would overflow sooner.
+// 1 / (2 sigma^2) of the widest and the narrowest sigma, pitches; with six nodes the squares of the exponentials would overflow sooner.
 constexpr double HEIGHT_MIN = 0.5 / (5.0 * 5.0);
 constexpr double HEIGHT_MAX = std::max(COLUMNS, ROWS) < 6 ? 0.5 / (0.158 * 0.158) : 17.0;
 // Root of the sum of the model's squares, below which it is taken to be that.
@@ -116,9 +115,7 @@ template <int N> struct Parabola {
 };
 
 // Limited to the nodes and `margin` around them.
-double within(double at, int first, int nodes, double margin) {
-  return std::clamp(at, first - margin, first + nodes - 1 + margin);
-}
+double within(double at, int first, int nodes, double margin) { return std::clamp(at, first - margin, first + nodes - 1 + margin); }
 
 State guess(const Readings &p, int peak_column, int peak_row) {
   double along_x[COLUMNS] = {}, along_y[ROWS] = {};
@@ -130,9 +127,8 @@ State guess(const Readings &p, int peak_column, int peak_row) {
   }
   const Parabola<COLUMNS> x(along_x, FIRST_COLUMN);
   const Parabola<ROWS> y(along_y, FIRST_ROW);
-  const double height =
-      std::clamp((GUESS_WEIGHT * GUESS_HEIGHT - x.curvature - y.curvature) / (x.axis.n2 + y.axis.n2 + GUESS_WEIGHT),
-                 GUESS_HEIGHT_MIN, GUESS_HEIGHT_MAX);
+  const double height = std::clamp((GUESS_WEIGHT * GUESS_HEIGHT - x.curvature - y.curvature) / (x.axis.n2 + y.axis.n2 + GUESS_WEIGHT),
+                                   GUESS_HEIGHT_MIN, GUESS_HEIGHT_MAX);
   const double half = 0.5 / height;
   return {within(x.axis.kappa * 0.5 + x.linear * half, FIRST_COLUMN, COLUMNS, 1.0),
           within(y.axis.kappa * 0.5 + y.linear * half, FIRST_ROW, ROWS, 1.0), height, 1.0};
@@ -172,15 +168,13 @@ bool step(const Readings &p, bool last, State *state) {
   const double ratio = gain * b3 / (x.n2 * y.n0 + x.n0 * y.n2); // of the change of sigma to sigma
   const double dx = c1 - ratio * (x.kappa - 2.0 * state->x);
   const double dy = c2 - ratio * (y.kappa - 2.0 * state->y);
-  const double excess =
-      std::max(std::max(std::abs(dx), std::abs(dy)) * (1.0 / MOVE_LIMIT), std::abs(ratio) * (1.0 / WIDEN_LIMIT));
+  const double excess = std::max(std::max(std::abs(dx), std::abs(dy)) * (1.0 / MOVE_LIMIT), std::abs(ratio) * (1.0 / WIDEN_LIMIT));
   const double share = excess > 1.0 ? 1.0 / excess : 1.0;
   last = last || excess < SETTLED;
   if (last) {
     const double at_x = state->x - x.mean, at_y = state->y - y.mean;
-    const double change =
-        c1 * at_x + c2 * at_y +
-        ratio * (at_x * (state->x + x.mean - x.kappa) - x.variance + at_y * (state->y + y.mean - y.kappa) - y.variance);
+    const double change = c1 * at_x + c2 * at_y +
+                          ratio * (at_x * (state->x + x.mean - x.kappa) - x.variance + at_y * (state->y + y.mean - y.kappa) - y.variance);
     const double rise = state->height * (state->x * state->x + state->y * state->y);
     state->p0 = peak * std::exp(rise) * (1.0 + 2.0 * state->height * share * change);
   }
@@ -224,9 +218,8 @@ KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q
 
   const auto pitch_mm = static_cast<double>(array.pitch_mm);
   const std::uint8_t origin = grid.sensor[-FIRST_COLUMN * ROWS - FIRST_ROW];
-  return {pitch_mm * (state.x + static_cast<double>(array.x[origin])),
-          pitch_mm * (state.y + static_cast<double>(array.y[origin])), state.p0 * largest / 1024.0,
-          pitch_mm * std::sqrt(0.5 / state.height), CONTACT_FLAG_FIT_VALID};
+  return {pitch_mm * (state.x + static_cast<double>(array.x[origin])), pitch_mm * (state.y + static_cast<double>(array.y[origin])),
+          state.p0 * largest / 1024.0, pitch_mm * std::sqrt(0.5 / state.height), CONTACT_FLAG_FIT_VALID};
 }
 
 } // namespace fingertip::fitting

@@ -18,16 +18,14 @@ using FaultKind = Fault::Kind;
 
 constexpr double UNLIMITED = std::numeric_limits<double>::infinity();
 constexpr std::uint64_t SEED = 1001;
-// More than the same grasp opens without the fault: a first grip comes down to what the load needs, of the cup by 1.5
-// mm.
+// More than the same grasp opens without the fault: a first grip comes down to what the load needs, of the cup by 1.5 mm.
 constexpr double OPENS_mm = 1.0;
 
 struct Thing {
   const char *name;
   double mass_kg, friction, at_1_mm_N, exponent, crushes_N, cap_N;
 };
-constexpr Thing THINGS[] = {{"paper cup", 0.05, 0.6, 2.5, 1.3, 5.0, 4.0},
-                            {"ball", 0.25, 0.5, 3.0, 1.6, UNLIMITED, 10.0}};
+constexpr Thing THINGS[] = {{"paper cup", 0.05, 0.6, 2.5, 1.3, 5.0, 4.0}, {"ball", 0.25, 0.5, 3.0, 1.6, UNLIMITED, 10.0}};
 
 enum Fingers { NONE = 0, LEFT = 1, BOTH = 3 };
 constexpr std::uint32_t LEFT_STALE = GRIP_FINGER_0_STALE, STALE = GRIP_FINGER_0_STALE | GRIP_FINGER_1_STALE;
@@ -95,8 +93,7 @@ struct FaultTrial {
   bool is_untold = false;
 };
 
-KindTrial trial_of(const Thing &thing, const std::string &gripper, const When &when, const Happening &happening,
-                   std::uint64_t n) {
+KindTrial trial_of(const Thing &thing, const std::string &gripper, const When &when, const Happening &happening, std::uint64_t n) {
   KindTrial trial;
   trial.gripper = gripper_mechanics(gripper);
   trial.seed = SEED + n;
@@ -198,10 +195,8 @@ nlohmann::ordered_json row_of(const FaultTrial &one, double may_open_mm) {
   const double cap_N = one.thing.cap_N;
   const KindOutcome outcome = outcome_of(one, one.trial);
   const Failed &failed = outcome.failed;
-  const bool ends =
-      one.ends_in.empty() || std::find(one.ends_in.begin(), one.ends_in.end(), failed.state) != one.ends_in.end();
-  const bool reports = (failed.trouble & one.all_of) == one.all_of &&
-                       (one.any_of == 0 || (failed.trouble & one.any_of) != 0) &&
+  const bool ends = one.ends_in.empty() || std::find(one.ends_in.begin(), one.ends_in.end(), failed.state) != one.ends_in.end();
+  const bool reports = (failed.trouble & one.all_of) == one.all_of && (one.any_of == 0 || (failed.trouble & one.any_of) != 0) &&
                        failed.gripper_fault == (one.happening.kind == FaultKind::fault ? 9 : 0);
   return {{"fault", one.happening.name},
           {"state", one.when.name},

@@ -31,11 +31,10 @@ struct Wrong {
   Fault::Kind kind;
   double frames; // 0: for good
 };
-constexpr Wrong WRONG[] = {{"none", Fault::Kind::nothing, 1e-9}, {"frame", Fault::Kind::nothing, 1},
-                           {"frames", Fault::Kind::nothing, 10}, {"nothing", Fault::Kind::nothing, 0},
-                           {"spike", Fault::Kind::spike, 1},     {"tared", Fault::Kind::tared, 0},
-                           {"reboot", Fault::Kind::reboot, 0},   {"moved_zero", Fault::Kind::moved_zero, 0},
-                           {"weak", Fault::Kind::weak, 0}};
+constexpr Wrong WRONG[] = {
+    {"none", Fault::Kind::nothing, 1e-9}, {"frame", Fault::Kind::nothing, 1},         {"frames", Fault::Kind::nothing, 10},
+    {"nothing", Fault::Kind::nothing, 0}, {"spike", Fault::Kind::spike, 1},           {"tared", Fault::Kind::tared, 0},
+    {"reboot", Fault::Kind::reboot, 0},   {"moved_zero", Fault::Kind::moved_zero, 0}, {"weak", Fault::Kind::weak, 0}};
 
 struct Options {
   std::string kind = "usual", gripper = gripper_models().front().model, controller = "ours", settings, wrong;
@@ -200,8 +199,7 @@ ordered_json measured(const Options &options) {
 int run(int argc, char **argv) {
   CLI::App app("Grasps in simulated time, as JSON on the standard output.", "fingertip_grasp_kinds");
   Options options;
-  app.add_option("--kind", options.kind, "gentle, usual, rough, slick, fragile; several, split by commas, by turns")
-      ->capture_default_str();
+  app.add_option("--kind", options.kind, "gentle, usual, rough, slick, fragile; several, split by commas, by turns")->capture_default_str();
   app.add_option("--gripper", options.gripper, gripper_model_names() + " or ideal")->capture_default_str();
   app.add_option("--controller", options.controller, "textbook; fixed: 15 N; paper: eq. (5) and (6) at 6 N")
       ->check(CLI::IsMember({"ours", "textbook", "fixed", "paper"}))
@@ -217,15 +215,13 @@ int run(int argc, char **argv) {
       ->check(CLI::Range(0.0, 1.0))
       ->type_name("SHARE")
       ->capture_default_str();
-  app.add_option("--still", options.still_s,
-                 "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
+  app.add_option("--still", options.still_s, "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
       ->check(CLI::PositiveNumber)
       ->type_name("S");
   const auto wrong = texts_of(WRONG, [](const Wrong &one) { return one.name; });
   app.add_option("--wrong", options.wrong, "Instead of events: what one fingertip reports wrongly in a steady hold")
       ->check(CLI::IsMember(wrong));
-  app.add_option("--seed", options.seed,
-                 "Another set of grasps; 1 to 999 are there to choose constants by, the report judges by others")
+  app.add_option("--seed", options.seed, "Another set of grasps; 1 to 999 are there to choose constants by, the report judges by others")
       ->capture_default_str();
   app.add_option("--count", options.count, "Grasps")->check(CLI::Range(1, 1000000))->capture_default_str();
   app.add_option("--jobs", options.jobs, "Threads")->check(CLI::Range(1, 64))->capture_default_str();

@@ -77,8 +77,7 @@ struct gate_pad {
     }
     for (std::size_t k = 0; k < SENSORS; k++) {
       const double reads_Pa = offset_Pa[k] + drift_Pa_s[k] * (t_s - 1.0) + pressure_Pa[k] + noise();
-      taken.pressure_Pa_q10[k] =
-          is_warmed ? converted(k, reads_Pa, at_degC) : static_cast<std::int32_t>(1024.0 * reads_Pa);
+      taken.pressure_Pa_q10[k] = is_warmed ? converted(k, reads_Pa, at_degC) : static_cast<std::int32_t>(1024.0 * reads_Pa);
     }
     taken.number++;
     taken.t_us = static_cast<std::uint64_t>(1e6 * t_s);
@@ -97,12 +96,11 @@ struct gate_pad {
 MEASURE_RECORD(gate_pad)
 
 // temperature: none, or [4] as gate_pad has it. coefficients [sensor][6]: of the sensors' PROMs.
-static void gate_begin(std::int64_t seed, double frames_per_s, std::int64_t noise_Pa_q10,
-                       Batch<const double, 1> offset_Pa, Batch<const double, 1> drift_Pa_s,
-                       Batch<const double, 1> temperature, Batch<const std::uint16_t, 2> coefficients,
+static void gate_begin(std::int64_t seed, double frames_per_s, std::int64_t noise_Pa_q10, Batch<const double, 1> offset_Pa,
+                       Batch<const double, 1> drift_Pa_s, Batch<const double, 1> temperature, Batch<const std::uint16_t, 2> coefficients,
                        Batch<gate_pad, 1> pads) {
-  require(offset_Pa.size() == SENSORS && drift_Pa_s.size() == SENSORS && coefficients.size() == SENSORS &&
-              coefficients.size(1) == 6 && temperature.size() % 4 == 0 && pads.size() == 1,
+  require(offset_Pa.size() == SENSORS && drift_Pa_s.size() == SENSORS && coefficients.size() == SENSORS && coefficients.size(1) == 6 &&
+              temperature.size() % 4 == 0 && pads.size() == 1,
           "another number of sensors, or no pad");
   gate_pad &pad = pads[0];
   pad = {};
@@ -130,12 +128,10 @@ MEASURE_ENTRY(gate_begin)
 // Runs a pad for a number of frames under a contact whose share goes from the first to the second of `share` within
 // its third, in seconds, and stays there; and under what remains of another, which decays exponentially. Of each frame:
 // flags (enum Flag), worst_zero_Pa, and pressure_Pa_q10 [frame][sensor], each unless the array is empty.
-static void gate_run(Batch<gate_pad, 1> pads, std::int64_t frames, Batch<const double, 1> contact_Pa,
-                     Batch<const double, 1> share, Batch<const double, 1> remains_Pa, double decay_s,
-                     Batch<std::uint8_t, 1> flags, Batch<float, 1> worst_zero_Pa,
+static void gate_run(Batch<gate_pad, 1> pads, std::int64_t frames, Batch<const double, 1> contact_Pa, Batch<const double, 1> share,
+                     Batch<const double, 1> remains_Pa, double decay_s, Batch<std::uint8_t, 1> flags, Batch<float, 1> worst_zero_Pa,
                      Batch<std::int32_t, 2> pressure_Pa_q10) {
-  require(contact_Pa.size() == SENSORS && remains_Pa.size() == SENSORS && share.size() == 3,
-          "another number of sensors");
+  require(contact_Pa.size() == SENSORS && remains_Pa.size() == SENSORS && share.size() == 3, "another number of sensors");
   const auto fits = [&](const auto &array) { return array.size() == 0 || std::int64_t(array.size()) == frames; };
   require(fits(flags) && fits(worst_zero_Pa) && fits(pressure_Pa_q10), "another number of frames");
   gate_pad &pad = pads[0];
@@ -165,9 +161,8 @@ MEASURE_ENTRY(gate_run)
 
 // The firmware's condition of readings [frame][sensor], 1/1024 Pa. Of each frame: flags (enum Flag), bitmap of the
 // usable sensors, and pressure [frame][sensor] above the zero; and past_sd of the last frame.
-static void gate_series(double noise_Pa, Batch<const std::uint64_t, 1> t_us,
-                        Batch<const std::int32_t, 2> reading_Pa_q10, Batch<std::uint8_t, 1> flags,
-                        Batch<std::uint32_t, 1> usable, Batch<std::int32_t, 2> pressure_Pa_q10,
+static void gate_series(double noise_Pa, Batch<const std::uint64_t, 1> t_us, Batch<const std::int32_t, 2> reading_Pa_q10,
+                        Batch<std::uint8_t, 1> flags, Batch<std::uint32_t, 1> usable, Batch<std::int32_t, 2> pressure_Pa_q10,
                         Batch<std::int32_t, 1> past_sd_Pa_q10) {
   same_length(t_us, reading_Pa_q10, flags, usable, pressure_Pa_q10);
   const std::size_t sensors = reading_Pa_q10.size(1);

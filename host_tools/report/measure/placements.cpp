@@ -13,13 +13,12 @@ using namespace fingertip::measure;
 using calibrating::Judgement;
 using calibrating::Placement;
 
-// Percents and sds as effects.hpp has them. overhang_mm: how far the rubber extends beyond the outer sensors; 0:
-// without end.
+// Percents and sds as effects.hpp has them. overhang_mm: how far the rubber extends beyond the outer sensors; 0: without end.
 struct pad_kind {
   double gain_percent, memory_percent, misplaced_mm, dip_percent, widths_percent, overhang_mm;
 };
-MEASURE_RECORD(pad_kind, FIELD(gain_percent), FIELD(memory_percent), FIELD(misplaced_mm), FIELD(dip_percent),
-               FIELD(widths_percent), FIELD(overhang_mm))
+MEASURE_RECORD(pad_kind, FIELD(gain_percent), FIELD(memory_percent), FIELD(misplaced_mm), FIELD(dip_percent), FIELD(widths_percent),
+               FIELD(overhang_mm))
 
 namespace {
 
@@ -37,9 +36,8 @@ struct Pads {
 
   PadOptions options(std::size_t i) const {
     const pad_kind &kind = *kinds.row_or_all(i);
-    return {kind.gain_percent,   kind.memory_percent,
-            kind.misplaced_mm,   kind.dip_percent,
-            kind.widths_percent, kind.overhang_mm > 0.0 ? &block_table(layer_mm, kind.overhang_mm, cache) : nullptr};
+    return {kind.gain_percent, kind.memory_percent, kind.misplaced_mm,
+            kind.dip_percent,  kind.widths_percent, kind.overhang_mm > 0.0 ? &block_table(layer_mm, kind.overhang_mm, cache) : nullptr};
   }
   std::uint64_t seed(std::size_t i) const { return static_cast<std::uint64_t>(seeds[i]); }
   SessionPad pad(std::size_t i) const { return {options(i), layer_mm, seed(i)}; }
@@ -82,8 +80,7 @@ Judgement lead(Session &session, SessionPad &pad, std::vector<Placement> &placem
 
 // The placements of sessions without a calibration [pad][placement][sensor], with their times and fadings.
 static void pad_placements(std::string session_kind, Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache,
-                           Batch<const std::int64_t, 1> seeds, Batch<double, 2> t_s, Batch<double, 3> reading_Pa,
-                           Batch<double, 2> fading) {
+                           Batch<const std::int64_t, 1> seeds, Batch<double, 2> t_s, Batch<double, 3> reading_Pa, Batch<double, 2> fading) {
   same_length(seeds, t_s, reading_Pa, fading);
   require(t_s.size(1) == reading_Pa.size(1) && t_s.size(1) == fading.size(1), "other numbers of placements");
   const Pads pads{kinds, layer_mm, cache, seeds};
@@ -120,13 +117,11 @@ static void pad_lead(std::string session_kind, Batch<const pad_kind, 1> kinds, d
 MEASURE_ENTRY(pad_lead)
 
 // Taps [pad][tap] by small, round and flat objects in turn, and the readings [pad][tap][sensor] of one frame of each.
-static void pad_taps(Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache,
-                     Batch<const std::int64_t, 1> seeds, Batch<double, 2> x_mm, Batch<double, 2> y_mm,
-                     Batch<double, 2> force_N, Batch<double, 3> reading_Pa) {
+static void pad_taps(Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache, Batch<const std::int64_t, 1> seeds,
+                     Batch<double, 2> x_mm, Batch<double, 2> y_mm, Batch<double, 2> force_N, Batch<double, 3> reading_Pa) {
   same_length(seeds, x_mm, y_mm, force_N, reading_Pa);
   const Pads pads{kinds, layer_mm, cache, seeds};
-  const twin::ContactTable *const objects[] = {&contact_table(twin::indenter("sphere6"), layer_mm, cache),
-                                               &pads.feet().round,
+  const twin::ContactTable *const objects[] = {&contact_table(twin::indenter("sphere6"), layer_mm, cache), &pads.feet().round,
                                                &contact_table(twin::indenter("cylinder6"), layer_mm, cache)};
   const calibrating::Array array = session_array();
   pads.each([&](std::size_t i) {
@@ -144,8 +139,8 @@ static void pad_taps(Batch<const pad_kind, 1> kinds, double layer_mm, std::strin
 MEASURE_ENTRY(pad_taps)
 
 // True gains [pad][sensor] of readings that have settled.
-static void pad_gains(Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache,
-                      Batch<const std::int64_t, 1> seeds, Batch<double, 2> gain) {
+static void pad_gains(Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache, Batch<const std::int64_t, 1> seeds,
+                      Batch<double, 2> gain) {
   same_length(seeds, gain);
   const Pads pads{kinds, layer_mm, cache, seeds};
   pads.each([&](std::size_t i) {
@@ -157,10 +152,9 @@ MEASURE_ENTRY(pad_gains)
 
 // What accepted calibrations found: sessions of thirty placements on pads of their own, each repeated on another pad
 // until a calibration is accepted. true_gain, true_dip_share and seats are how that pad is.
-static void pad_calibrated(Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache,
-                           Batch<const std::int64_t, 1> seeds, Batch<calibration, 1> found,
-                           Batch<calibrated_sensor, 2> sensors, Batch<fit_own, 2> own, Batch<double, 2> true_gain,
-                           Batch<double, 1> true_dip_share, Batch<twin::Pad::Seat, 2> seats) {
+static void pad_calibrated(Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache, Batch<const std::int64_t, 1> seeds,
+                           Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors, Batch<fit_own, 2> own,
+                           Batch<double, 2> true_gain, Batch<double, 1> true_dip_share, Batch<twin::Pad::Seat, 2> seats) {
   same_length(seeds, found, sensors, own, true_gain, true_dip_share, seats);
   const Pads pads{kinds, layer_mm, cache, seeds};
   const Feet &feet = pads.feet();

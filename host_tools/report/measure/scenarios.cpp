@@ -23,15 +23,14 @@ static void add_ends(double overhang_mm, std::string cache, Batch<pad_profile, 1
 MEASURE_ENTRY(add_ends)
 
 // Adds to the pressures on the base [touch][sensor] what the ends of a block with this overhang do.
-static void add_block(std::string name, double layer_mm, double overhang_mm, std::string cache,
-                      Batch<const twin::Touch, 1> touches, Batch<double, 2> base_Pa) {
+static void add_block(std::string name, double layer_mm, double overhang_mm, std::string cache, Batch<const twin::Touch, 1> touches,
+                      Batch<double, 2> base_Pa) {
   same_length(touches, base_Pa);
   const twin::BlockTable &block = block_table(layer_mm, overhang_mm, cache);
   const twin::ContactTable &table = contact_table(twin::indenter(name), layer_mm, cache);
   in_parallel(touches.size(), [&](std::size_t i) {
     const twin::Touch &touch = touches[i];
-    const twin::BlockTable::Load load{touch.force_N, touch.pull_x_N, touch.pull_y_N,
-                                      table.contact_radius_mm(touch.force_N)};
+    const twin::BlockTable::Load load{touch.force_N, touch.pull_x_N, touch.pull_y_N, table.contact_radius_mm(touch.force_N)};
     for (std::size_t k = 0; k < base_Pa.size(1); k++) {
       base_Pa.row(i)[k] += block.added_Pa(k, load, touch.x_mm, touch.y_mm);
     }
@@ -39,8 +38,7 @@ static void add_block(std::string name, double layer_mm, double overhang_mm, std
 }
 MEASURE_ENTRY(add_block)
 
-// The thickness that the width of a response to a usual contact shows [response][mm, its standard deviation, rounded as
-// the tool shows it].
+// The thickness that the width of a response to a usual contact shows [response][mm, its standard deviation, rounded as the tool shows it].
 static void thickness(Batch<const double, 1> width_mm, Batch<const double, 1> width_sd_mm, Batch<double, 2> figures) {
   same_length(width_mm, width_sd_mm, figures);
   require(figures.size(1) == 3, "another number of figures");
@@ -52,8 +50,7 @@ static void thickness(Batch<const double, 1> width_mm, Batch<const double, 1> wi
 }
 MEASURE_ENTRY(thickness)
 
-// What pads with these effects (twin/effects.hpp), a seed for each, report of the pressures on their bases
-// [pad][time][sensor].
+// What pads with these effects (twin/effects.hpp), a seed for each, report of the pressures on their bases [pad][time][sensor].
 static void rubber(std::string effects, double layer_mm, Batch<const std::int64_t, 1> seeds, Batch<const double, 1> t_s,
                    Batch<const double, 3> base_Pa, Batch<double, 3> reported_Pa) {
   same_length(seeds, base_Pa, reported_Pa);
@@ -81,9 +78,8 @@ struct scenario_options {
   double kinetic_share, dead_travel_mm;
   double margin_mm; // below 0: the kind's usual one
 };
-MEASURE_RECORD(scenario_options, FIELD(kind), FIELD(contact_shape), FIELD(layer_mm), FIELD(seconds), FIELD(seed),
-               FIELD(forces), FIELD(tangential), FIELD(friction), FIELD(kinetic_share), FIELD(dead_travel_mm),
-               FIELD(margin_mm))
+MEASURE_RECORD(scenario_options, FIELD(kind), FIELD(contact_shape), FIELD(layer_mm), FIELD(seconds), FIELD(seed), FIELD(forces),
+               FIELD(tangential), FIELD(friction), FIELD(kinetic_share), FIELD(dead_travel_mm), FIELD(margin_mm))
 
 struct scenario_phase {
   std::int64_t act;
@@ -151,8 +147,7 @@ static void scenario_touches(std::int64_t number, Batch<const std::int64_t, 1> a
                              Batch<twin::Touch, 1> touches) {
   same_length(act, t_s, touches);
   const twin::Scenario &scenario = scenarios().at(number);
-  in_parallel(touches.size(), [&](std::size_t i) {
-    touches[i] = scenario.episodes.at(static_cast<std::size_t>(act[i])).tracks[0].at(t_s[i]);
-  });
+  in_parallel(touches.size(),
+              [&](std::size_t i) { touches[i] = scenario.episodes.at(static_cast<std::size_t>(act[i])).tracks[0].at(t_s[i]); });
 }
 MEASURE_ENTRY(scenario_touches)

@@ -20,8 +20,8 @@ MEASURE_ENTRY(gains_begin)
 
 // One frame of each pad: what it has learnt of how far its gains are apart. gain_sd keeps its value where nothing was.
 static void gains_learn(Batch<const fit_array, 1> array, Batch<const fit_settings, 1> settings,
-                        Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const fit_result, 1> fits,
-                        std::int64_t is_first_of_touch, Batch<fit_gains, 1> gains, Batch<double, 1> gain_sd) {
+                        Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const fit_result, 1> fits, std::int64_t is_first_of_touch,
+                        Batch<fit_gains, 1> gains, Batch<double, 1> gain_sd) {
   checked(array, pressure_Pa_q10.size(1), {});
   same_length(gains, settings, pressure_Pa_q10, fits, gain_sd);
   for (std::size_t i = 0; i < gains.size(); i++) {

@@ -60,9 +60,8 @@ calibrating::Array session_array() {
 }
 
 SessionPad::SessionPad(const PadOptions &options, double layer_mm, std::uint64_t seed)
-    : base_Pa_(geometry.sensor_count), reported_Pa_(geometry.sensor_count), options_(options), layer_mm_(layer_mm),
-      seed_(seed), pad_(effects_of(options), geometry.sensor_count, layer_mm, AMBIENT_Pa, seed),
-      noise_(seed, NOISE, 0) {
+    : base_Pa_(geometry.sensor_count), reported_Pa_(geometry.sensor_count), options_(options), layer_mm_(layer_mm), seed_(seed),
+      pad_(effects_of(options), geometry.sensor_count, layer_mm, AMBIENT_Pa, seed), noise_(seed, NOISE, 0) {
   for (std::size_t k = 0; k < geometry.sensor_count; k++) {
     x_mm_.push_back(static_cast<double>(geometry.x_mm[k]) + pad_.seats()[k].dx_mm);
     y_mm_.push_back(static_cast<double>(geometry.y_mm[k]) + pad_.seats()[k].dy_mm);
@@ -94,8 +93,7 @@ void SessionPad::aim(const twin::ContactTable &object, double force_N, double x_
   }
 }
 
-calibrating::Placement SessionPad::place(const twin::ContactTable &foot, double force_N, double x_mm, double y_mm,
-                                         double angle_rad) {
+calibrating::Placement SessionPad::place(const twin::ContactTable &foot, double force_N, double x_mm, double y_mm, double angle_rad) {
   aim(foot, force_N, x_mm, y_mm, angle_rad);
   report(PAUSE_s, 0.0);
   report(DOWN_s, 1.0);
@@ -154,8 +152,7 @@ std::vector<double> SessionPad::settled_gains() const {
 }
 
 const char *name_of(SessionKind kind) {
-  static const char *const names[] = {"good",    "elongated", "offsets", "one_end",
-                                      "cluster", "drift",     "too_few", "weights"};
+  static const char *const names[] = {"good", "elongated", "offsets", "one_end", "cluster", "drift", "too_few", "weights"};
   return names[static_cast<int>(kind)];
 }
 
@@ -204,8 +201,7 @@ std::optional<calibrating::Placement> Session::next(SessionPad &pad, std::option
   }
   const bool lying = kind_ == SessionKind::elongated;
   const double angle = variant_ ? angle_rad_ : random_.uniform(0.0, M_PI);
-  calibrating::Placement placement =
-      pad.place(lying ? feet_.lying : feet_.round, force_N, x_mm, y_mm, lying ? angle : 0.0);
+  calibrating::Placement placement = pad.place(lying ? feet_.lying : feet_.round, force_N, x_mm, y_mm, lying ? angle : 0.0);
   for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
     placement.reading_Pa[k] += zero_Pa_[k] + drift_Pa_s_[k] * calibrating::RESTED_BEFORE_s;
     placement.rest_Pa.push_back(drift_Pa_s_[k] * placement.t_s);

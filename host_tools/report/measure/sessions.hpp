@@ -1,5 +1,4 @@
-// Simulated calibrations: pads of the twin on which a person sets down a weight, as it should be done and as it should
-// not.
+// Simulated calibrations: pads of the twin on which a person sets down a weight, as it should be done and as it should not.
 #pragma once
 
 #include "libfingertip/random.hpp"
@@ -31,10 +30,8 @@ class SessionPad {
 public:
   SessionPad(const PadOptions &options, double layer_mm, std::uint64_t seed);
 
-  // A weight is set down by hand and lifted after two seconds. The result has the means of the readings from 0.5 to 1 s
-  // after it was down.
-  calibrating::Placement place(const twin::ContactTable &foot, double force_N, double x_mm, double y_mm,
-                               double angle_rad);
+  // A weight is set down by hand and lifted after two seconds. The result has the means of the readings from 0.5 to 1 s after it was down.
+  calibrating::Placement place(const twin::ContactTable &foot, double force_N, double x_mm, double y_mm, double angle_rad);
   // A tap: the readings of one frame 0.15 s after it was down.
   std::vector<double> tap(const twin::ContactTable &object, double force_N, double x_mm, double y_mm);
 

@@ -10,9 +10,8 @@ const twin::ContactTable &contact_table(const twin::Indenter &indenter, double l
 }
 
 const twin::TractionTable &traction_table(const twin::Indenter &indenter, double layer_mm, const std::string &cache) {
-  return once_for(std::make_pair(indenter.name, layer_mm), [&] {
-    return twin::TractionTable(contact_table(indenter, layer_mm, cache), twin::silicone(layer_mm));
-  });
+  return once_for(std::make_pair(indenter.name, layer_mm),
+                  [&] { return twin::TractionTable(contact_table(indenter, layer_mm, cache), twin::silicone(layer_mm)); });
 }
 
 const twin::BlockTable &block_table(double layer_mm, double overhang_mm, const std::string &cache) {

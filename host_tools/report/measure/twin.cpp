@@ -25,14 +25,13 @@ static void random_begin(Batch<const std::int64_t, 1> seeds, std::int64_t stream
   same_length(index, states);
   length_or_one(states, seeds);
   for (std::size_t i = 0; i < states.size(); i++) {
-    states[i] = Random(static_cast<std::uint64_t>(*seeds.row_or_all(i)), static_cast<std::uint64_t>(stream),
-                       static_cast<std::uint64_t>(index[i]));
+    states[i] =
+        Random(static_cast<std::uint64_t>(*seeds.row_or_all(i)), static_cast<std::uint64_t>(stream), static_cast<std::uint64_t>(index[i]));
   }
 }
 MEASURE_ENTRY(random_begin)
 
-template <class Draw>
-static void draw_all(const Batch<Random, 1> &states, const Batch<double, 2> &values, const Draw &draw) {
+template <class Draw> static void draw_all(const Batch<Random, 1> &states, const Batch<double, 2> &values, const Draw &draw) {
   same_length(states, values);
   for (std::size_t i = 0; i < states.size(); i++) {
     std::generate_n(values.row(i), values.size(1), [&] { return draw(states[i]); });
@@ -79,18 +78,15 @@ struct contact_shape {
   std::int32_t kind; // of twin::Indenter::Shape
   double size_x_mm, size_y_mm, size_z_mm, edge_mm, youngs_modulus_Pa;
 };
-MEASURE_RECORD(contact_shape, FIELD(kind), FIELD(size_x_mm), FIELD(size_y_mm), FIELD(size_z_mm), FIELD(edge_mm),
-               FIELD(youngs_modulus_Pa))
+MEASURE_RECORD(contact_shape, FIELD(kind), FIELD(size_x_mm), FIELD(size_y_mm), FIELD(size_z_mm), FIELD(edge_mm), FIELD(youngs_modulus_Pa))
 using twin_touch = twin::Touch;
-MEASURE_RECORD(twin_touch, FIELD(force_N), FIELD(x_mm), FIELD(y_mm), FIELD(angle_rad), FIELD(pull_x_N), FIELD(pull_y_N),
-               FIELD(stuck_N))
+MEASURE_RECORD(twin_touch, FIELD(force_N), FIELD(x_mm), FIELD(y_mm), FIELD(angle_rad), FIELD(pull_x_N), FIELD(pull_y_N), FIELD(stuck_N))
 using twin_seat = twin::Pad::Seat;
 MEASURE_RECORD(twin_seat, FIELD(dx_mm), FIELD(dy_mm), FIELD(width))
 
 static void shape_named(std::string name, Batch<contact_shape, 1> shape) {
   const twin::Indenter &it = twin::indenter(name);
-  shape[0] = {
-      static_cast<std::int32_t>(it.shape), it.size_x_mm, it.size_y_mm, it.size_z_mm, it.edge_mm, it.youngs_modulus_Pa};
+  shape[0] = {static_cast<std::int32_t>(it.shape), it.size_x_mm, it.size_y_mm, it.size_z_mm, it.edge_mm, it.youngs_modulus_Pa};
 }
 MEASURE_ENTRY(shape_named)
 
@@ -105,13 +101,11 @@ static void base_pressure(std::string name, Batch<const contact_shape, 1> shape,
   require(base_Pa.size(1) == x_mm.size() && seats.size(1) == x_mm.size(), "another number of sensors");
   const contact_shape &it = shape[0];
   const auto kind = static_cast<twin::Indenter::Shape>(it.kind);
-  const twin::Indenter indenter{name,         "",           kind,       it.size_x_mm,
-                                it.size_y_mm, it.size_z_mm, it.edge_mm, it.youngs_modulus_Pa};
+  const twin::Indenter indenter{name, "", kind, it.size_x_mm, it.size_y_mm, it.size_z_mm, it.edge_mm, it.youngs_modulus_Pa};
   const twin::ContactTable &pressure = contact_table(indenter, layer_mm, cache);
   const auto is_pulled = [](const twin::Touch &touch) { return touch.pull_x_N != 0.0 || touch.pull_y_N != 0.0; };
-  const twin::TractionTable *const traction = std::any_of(touches.data, touches.data + touches.size(), is_pulled)
-                                                  ? &traction_table(indenter, layer_mm, cache)
-                                                  : nullptr;
+  const twin::TractionTable *const traction =
+      std::any_of(touches.data, touches.data + touches.size(), is_pulled) ? &traction_table(indenter, layer_mm, cache) : nullptr;
   in_parallel(touches.size(), [&](std::size_t i) {
     const twin::Touch &touch = touches[i];
     const double c = std::cos(touch.angle_rad), s = std::sin(touch.angle_rad);

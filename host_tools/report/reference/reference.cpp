@@ -234,8 +234,7 @@ Box box_of(const Array &array) {
 
 } // namespace
 
-Fit fit(const Array &array, const double *pressure_Pa, std::uint32_t usable, double noise_Pa, const Parameters *start,
-        bool all_starts) {
+Fit fit(const Array &array, const double *pressure_Pa, std::uint32_t usable, double noise_Pa, const Parameters *start, bool all_starts) {
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < array.x_mm.size(); k++) {
     if (usable >> k & 1u) {
@@ -278,8 +277,7 @@ Fit fit(const Array &array, const double *pressure_Pa, std::uint32_t usable, dou
   for (const Vector4 &guess : guesses) {
     const Vector4 end = levenberg_marquardt(samples, box, into_box(box, guess));
     offer(end);
-    if (std::none_of(ends.begin(), ends.end(),
-                     [&](const Vector4 &other) { return (other - end).cwiseAbs().maxCoeff() < SAME_END; })) {
+    if (std::none_of(ends.begin(), ends.end(), [&](const Vector4 &other) { return (other - end).cwiseAbs().maxCoeff() < SAME_END; })) {
       ends.push_back(end);
     }
   }

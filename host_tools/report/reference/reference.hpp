@@ -1,15 +1,13 @@
 // The fit's reference: the same model and the same parameters in double precision, by Ceres.
 //
-// Minimises sum_k (p0 exp(-((x_k - x)^2 + (y_k - y)^2) / (2 sigma^2)) - p_k)^2 (De Clercq et al.,
-// RA-L 2022, eq. (2) and (3)) in a box, from many starts, and keeps the lowest cost: in
-// ill-conditioned corners a single start stops early.
+// Minimises sum_k (p0 exp(-((x_k - x)^2 + (y_k - y)^2) / (2 sigma^2)) - p_k)^2 (De Clercq et al., RA-L 2022, eq. (2) and (3)) in a box,
+// from many starts, and keeps the lowest cost: in ill-conditioned corners a single start stops early.
 //
-// Ceres' starts are rationed. A bounded Levenberg-Marquardt of our own runs from every start. Ceres (at most 300
-// iterations) runs on every press from the lowest cost so found and, independently, from the strongest sensor at middle
-// width. Where the two costs differ or the condition number is above 1e5, and the bound of the location's sd is below 2
-// mm, it also runs from every distinct place where our own starts ended within four times the lowest cost. Newton steps
-// with the full Hessian bring the lowest cost to rounding. The test accuracy.reference compares with Ceres from every
-// start.
+// Ceres' starts are rationed. A bounded Levenberg-Marquardt of our own runs from every start. Ceres (at most 300 iterations) runs on every
+// press from the lowest cost so found and, independently, from the strongest sensor at middle width. Where the two costs differ or the
+// condition number is above 1e5, and the bound of the location's sd is below 2 mm, it also runs from every distinct place where our own
+// starts ended within four times the lowest cost. Newton steps with the full Hessian bring the lowest cost to rounding. The test
+// accuracy.reference compares with Ceres from every start.
 #pragma once
 
 #include <cstdint>
@@ -39,10 +37,8 @@ struct Fit {
   bool observable;
 };
 
-// pressure_Pa[sensor]; usable: bitmap of the sensors to use, at least four, one of them positive. start: a first guess
-// beside the built-in ones (every sensor among the four strongest, at three widths), or nullptr. all_starts: Ceres from
-// every start, always.
-Fit fit(const Array &array, const double *pressure_Pa, std::uint32_t usable, double noise_Pa, const Parameters *start,
-        bool all_starts);
+// pressure_Pa[sensor]; usable: bitmap of the sensors to use, at least four, one of them positive. start: a first guess beside the built-in
+// ones (every sensor among the four strongest, at three widths), or nullptr. all_starts: Ceres from every start, always.
+Fit fit(const Array &array, const double *pressure_Pa, std::uint32_t usable, double noise_Pa, const Parameters *start, bool all_starts);
 
 } // namespace fingertip::reference

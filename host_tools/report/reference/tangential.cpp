@@ -58,8 +58,8 @@ struct Prior {
 
 } // namespace
 
-TangentialFit fit_tangential_estimate(const pad_profile &profile, const std::vector<TangentialSample> &samples,
-                                      double noise_Pa, const TangentialStart &start) {
+TangentialFit fit_tangential_estimate(const pad_profile &profile, const std::vector<TangentialSample> &samples, double noise_Pa,
+                                      const TangentialStart &start) {
   double largest_Pa = 0.0;
   for (const TangentialSample &sample : samples) {
     largest_Pa = std::max(largest_Pa, sample.pressure_Pa);
@@ -74,14 +74,12 @@ TangentialFit fit_tangential_estimate(const pad_profile &profile, const std::vec
   ceres::Problem problem;
   for (const TangentialSample &sample : samples) {
     const double sd_Pa = together(base_Pa, sample.gain_sd * std::abs(sample.pressure_Pa));
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<Reading, 1, UNKNOWNS>(new Reading{profile, sample, 1.0 / sd_Pa}), nullptr,
-        u.data());
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Reading, 1, UNKNOWNS>(new Reading{profile, sample, 1.0 / sd_Pa}), nullptr,
+                             u.data());
   }
   const double long_sd = ELONGATION_SD_mm2 * force_N;
-  for (const Prior &prior :
-       {Prior{T, static_cast<double>(profile.spread_mm2), static_cast<double>(profile.spread_sd_mm2)},
-        Prior{E1, 0.0, long_sd}, Prior{E2, 0.0, long_sd}}) {
+  for (const Prior &prior : {Prior{T, static_cast<double>(profile.spread_mm2), static_cast<double>(profile.spread_sd_mm2)},
+                             Prior{E1, 0.0, long_sd}, Prior{E2, 0.0, long_sd}}) {
     problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Prior, 1, UNKNOWNS>(new Prior(prior)), nullptr, u.data());
   }
   problem.SetParameterLowerBound(u.data(), T, low);
@@ -120,8 +118,7 @@ TangentialFit fit_tangential_estimate(const pad_profile &profile, const std::vec
       jacobian(row, rows.cols[static_cast<std::size_t>(k)]) = rows.values[static_cast<std::size_t>(k)];
     }
   }
-  const Eigen::MatrixXd covariance =
-      (jacobian.transpose() * jacobian).ldlt().solve(Eigen::MatrixXd::Identity(UNKNOWNS, UNKNOWNS));
+  const Eigen::MatrixXd covariance = (jacobian.transpose() * jacobian).ldlt().solve(Eigen::MatrixXd::Identity(UNKNOWNS, UNKNOWNS));
   best.force_N = u[F];
   best.x_mm = u[X];
   best.y_mm = u[Y];

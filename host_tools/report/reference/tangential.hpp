@@ -1,6 +1,5 @@
-// The tangential estimate's reference: its model, weights and priors (firmware/fit/NUMERICS.md,
-// "Tangential force") in double precision and millimetres, minimised by Ceres with derivatives of
-// its own from many starts; the lowest cost counts.
+// The tangential estimate's reference: its model, weights and priors (firmware/fit/NUMERICS.md, "Tangential force") in double precision and
+// millimetres, minimised by Ceres with derivatives of its own from many starts; the lowest cost counts.
 #pragma once
 
 #include "common/pad_profile.h"
@@ -25,7 +24,7 @@ struct TangentialFit {
   bool at_bound;
 };
 
-TangentialFit fit_tangential_estimate(const pad_profile &profile, const std::vector<TangentialSample> &samples,
-                                      double noise_Pa, const TangentialStart &start);
+TangentialFit fit_tangential_estimate(const pad_profile &profile, const std::vector<TangentialSample> &samples, double noise_Pa,
+                                      const TangentialStart &start);
 
 } // namespace fingertip::reference

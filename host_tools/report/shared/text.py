@@ -1,8 +1,7 @@
 """The text of a report: the file text.md.in of its folder with the figures filled in, then every table that this file does not name.
 
-In text.md.in, {goals} is the table of goals, {table NAME} a table of the figures, and {NAME:.1f} a figure in Python's format, {NAME.KEY:.1f} one
-of a dict. A section (##) whose
-table was not measured is left out.
+In text.md.in, {goals} is the table of goals, {table NAME} a table of the figures, and {NAME:.1f} a figure in Python's format,
+{NAME.KEY:.1f} one of a dict. A section (##) whose table was not measured is left out.
 """
 
 import pathlib

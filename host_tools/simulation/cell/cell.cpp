@@ -19,9 +19,8 @@ namespace fingertip::cell {
 namespace {
 
 constexpr double M = 1e-3; // m per mm
-// Time constants of a contact, normal and along it. The equal ones that MuJoCo has by default lift a sliding face off
-// the object, by friction times twice the constant times its speed. A held object creeps with the second over the
-// ratio.
+// Time constants of a contact, normal and along it. The equal ones that MuJoCo has by default lift a sliding face off the object, by
+// friction times twice the constant times its speed. A held object creeps with the second over the ratio.
 constexpr double CONTACT_s = 1e-3, SLIDE_s = 20e-3, IMPRATIO = 1000.0;
 constexpr double GYRATION = 0.6;              // radius of, per half of the mean size
 constexpr double LOSS_s = 5e-4;               // of the rubber's normal spring
@@ -43,18 +42,13 @@ struct Size {
 Size size_of(const KindOfGrasp &grasp) {
   const double w = 0.5 * grasp.width_mm, h = 0.5 * grasp.height_mm, d = 0.5 * grasp.depth_mm;
   switch (grasp.shape) {
-  case Shape::ball:
-    return {"sphere", w, w, w};
-  case Shape::egg:
-    return {"ellipsoid", w, w, 1.3 * w};
+  case Shape::ball: return {"sphere", w, w, w};
+  case Shape::egg: return {"ellipsoid", w, w, 1.3 * w};
   case Shape::box:
-  case Shape::plate:
-    return {"box", w, d, h};
-  case Shape::lying:
-    return {"cylinder", w, h, w};
+  case Shape::plate: return {"box", w, d, h};
+  case Shape::lying: return {"cylinder", w, h, w};
   case Shape::upright:
-  case Shape::cup:
-    return {"cylinder", w, w, h};
+  case Shape::cup: return {"cylinder", w, w, h};
   }
   return {"sphere", w, w, w};
 }
@@ -68,15 +62,13 @@ std::string xml_of(const KindOfGrasp &grasp) {
   const double up_mm = s * grasp.place_mm.x + c * grasp.place_mm.y;
   std::ostringstream xml;
   xml.precision(12);
-  xml << "<mujoco><option timestep='" << Cell::STEP_s << "' integrator='implicitfast' cone='elliptic' impratio='"
-      << IMPRATIO
+  xml << "<mujoco><option timestep='" << Cell::STEP_s << "' integrator='implicitfast' cone='elliptic' impratio='" << IMPRATIO
       << "'><flag multiccd='enable' island='disable' autoreset='disable'/></option><default>"
          "<geom contype='0' conaffinity='0'/><pair solref='"
-      << CONTACT_s
-      << " 1' solimp='.95 .99 .0002'/></default><worldbody><geom name='table' type='plane' size='1 1 .1' pos='0 0 "
+      << CONTACT_s << " 1' solimp='.95 .99 .0002'/></default><worldbody><geom name='table' type='plane' size='1 1 .1' pos='0 0 "
       << -M * size.z_mm << "'/>"
-      << "<body name='object' pos='" << M * grasp.off_mm << " 0 0'><freejoint/><inertial pos='0 " << M * grasp.com_mm.x
-      << " " << M * grasp.com_mm.y << "' mass='" << grasp.mass_kg << "' diaginertia='";
+      << "<body name='object' pos='" << M * grasp.off_mm << " 0 0'><freejoint/><inertial pos='0 " << M * grasp.com_mm.x << " "
+      << M * grasp.com_mm.y << "' mass='" << grasp.mass_kg << "' diaginertia='";
   for (int i = 0; i < 3; i++) {
     xml << grasp.mass_kg * M * M * gyration_mm * gyration_mm << " ";
   }
@@ -89,18 +81,16 @@ std::string xml_of(const KindOfGrasp &grasp) {
   }
   xml << "/></body>";
   for (const int side : {-1, 1}) {
-    xml << "<body gravcomp='1' pos='" << side * M * (0.5 * grasp.width_mm + PAD_mm) << " " << -M * level_mm << " "
-        << -M * up_mm << "'><inertial pos='0 0 0' mass='" << Cell::FACE_kg << "' diaginertia='1e-6 1e-6 1e-6'/>"
+    xml << "<body gravcomp='1' pos='" << side * M * (0.5 * grasp.width_mm + PAD_mm) << " " << -M * level_mm << " " << -M * up_mm
+        << "'><inertial pos='0 0 0' mass='" << Cell::FACE_kg << "' diaginertia='1e-6 1e-6 1e-6'/>"
         << "<joint type='slide' axis='" << -side << " 0 0'/><joint type='slide' axis='0 1 0'/>"
-        << "<joint type='slide' axis='0 0 1'/><geom name='face" << (side > 0) << "' type='box' size='" << M * PAD_mm
-        << " " << M * pad_half_x_mm() << " " << M * pad_half_y_mm() << "' euler='" << turn * 180.0 / M_PI
-        << " 0 0'/></body>";
+        << "<joint type='slide' axis='0 0 1'/><geom name='face" << (side > 0) << "' type='box' size='" << M * PAD_mm << " "
+        << M * pad_half_x_mm() << " " << M * pad_half_y_mm() << "' euler='" << turn * 180.0 / M_PI << " 0 0'/></body>";
   }
   xml << "</worldbody><contact><pair geom1='thing' geom2='table' condim='6' friction='" << grasp.table_friction << " "
       << grasp.table_friction << " .001 " << M * TABLE_ROLLS << " " << M * TABLE_ROLLS << "'/>";
   for (const int side : {0, 1}) {
-    xml << "<pair name='pair" << side << "' geom1='thing' geom2='face" << side << "' condim='4' solreffriction='"
-        << SLIDE_s << " 1'/>";
+    xml << "<pair name='pair" << side << "' geom1='thing' geom2='face" << side << "' condim='4' solreffriction='" << SLIDE_s << " 1'/>";
   }
   xml << "</contact></mujoco>";
   return xml.str();
@@ -163,8 +153,7 @@ struct Cell::World {
     double x = std::max(pressed_mm, 0.0);
     for (int i = 0; i < 20 && x > 0.0; i++) {
       const double force_N = pad.kind.at_1_mm_N * std::pow(x, grasp.exponent);
-      const double step =
-          (x + pad.gives_mm_N * force_N - pressed_mm) / (1.0 + pad.gives_mm_N * grasp.exponent * force_N / x);
+      const double step = (x + pad.gives_mm_N * force_N - pressed_mm) / (1.0 + pad.gives_mm_N * grasp.exponent * force_N / x);
       x -= step;
       if (std::abs(step) < 1e-9) {
         break;
@@ -189,8 +178,7 @@ struct Cell::World {
     }
     const double stiffness_N_m = pressed_mm > 0.0 ? grasp.exponent * pad.elastic_N / (M * pressed_mm) : 0.0;
     const double damping = grasp.rubber_N_s_mm / M + LOSS_s * stiffness_N_m;
-    const double spring_N =
-        pressed_mm > 0.0 ? std::clamp(pad.elastic_N - loss_N, 0.0, pad.elastic_N) : FREE_N_mm * pressed_mm;
+    const double spring_N = pressed_mm > 0.0 ? std::clamp(pad.elastic_N - loss_N, 0.0, pad.elastic_N) : FREE_N_mm * pressed_mm;
     pad.force_N = pad.points.empty() ? 0.0 : std::max(spring_N, 0.0);
     data->qfrc_applied[pad.dof] = spring_N + damping * M * finger_mm_s;
     model->dof_damping[pad.dof] = damping;
@@ -203,8 +191,7 @@ struct Cell::World {
       const double spring_N = pad.shear_N_m * data->qpos[model->jnt_qposadr[model->dof_jntid[dof]]];
       data->qfrc_applied[dof] = -spring_N;
       model->dof_damping[dof] = grasp.rubber_N_s_mm / M;
-      (k == 1 ? pad.load_N.x : pad.load_N.y) =
-          pad.points.empty() ? 0.0 : spring_N + grasp.rubber_N_s_mm / M * data->qvel[dof];
+      (k == 1 ? pad.load_N.x : pad.load_N.y) = pad.points.empty() ? 0.0 : spring_N + grasp.rubber_N_s_mm / M * data->qvel[dof];
     }
   }
 
@@ -370,9 +357,7 @@ Patch Cell::patch(std::size_t finger) const {
   }
   const double mirror = finger == 0 ? 1.0 : -1.0;
   const double tc = std::cos(world_->turn), ts = std::sin(world_->turn);
-  const auto in_own = [&](double level, double up) {
-    return Vector{mirror * (tc * level + ts * up), tc * up - ts * level};
-  };
+  const auto in_own = [&](double level, double up) { return Vector{mirror * (tc * level + ts * up), tc * up - ts * level}; };
   const Vector at = in_own(c * u_mm - s * v_mm, s * u_mm + c * v_mm), pull = in_own(pad.load_N.x, pad.load_N.y);
   patch.force_N = pad.force_N;
   patch.x_mm = at.x;

@@ -1,5 +1,4 @@
-// The simulated cell: two pads of rubber on the fingers of a gripper, an object between them, a table
-// under it until the hand lifts.
+// The simulated cell: two pads of rubber on the fingers of a gripper, an object between them, a table under it until the hand lifts.
 //
 // MuJoCo has the object's free body, its contacts with both faces and the table, and their friction
 // (elliptic cones, torsion). Each face is a rigid box of FACE_kg that the rubber behind it holds:

@@ -24,8 +24,7 @@ int serve(const Options &options) {
   GripperMotion motion(GripperServer::mechanics(options.server.model));
   if (options.object_mm > 0) {
     motion.blocked_at = [&](double width_mm, double force_N) {
-      return force_N > 0 && width_mm < options.object_mm &&
-             (options.object_mm - width_mm) * options.stiffness_N_mm >= force_N;
+      return force_N > 0 && width_mm < options.object_mm && (options.object_mm - width_mm) * options.stiffness_N_mm >= force_N;
     };
   }
   GripperServer server(motion, options.server);
@@ -42,8 +41,7 @@ int serve(const Options &options) {
 } // namespace
 
 int main(int argc, char **argv) {
-  CLI::App app("Serves a simulated gripper with its own protocol; prints its port. Ctrl-C ends it.",
-               "fingertip_cell_gripper");
+  CLI::App app("Serves a simulated gripper with its own protocol; prints its port. Ctrl-C ends it.", "fingertip_cell_gripper");
   Options options;
   const auto models = texts_of(gripper_models(), [](const GripperTraits &one) { return one.model; });
   app.add_option("--model", options.server.model, "Which one")->required()->check(CLI::IsMember(models));
@@ -59,9 +57,7 @@ int main(int argc, char **argv) {
   app.add_option("--line", options.trouble.fault, "What befalls each answer")
       ->type_name("FAULT")
       ->transform(CLI::CheckedTransformer(line_faults()));
-  app.add_option("--fault", options.fault, "The gripper's own, by the maker's code")
-      ->type_name("CODE")
-      ->check(CLI::Range(0, 255));
+  app.add_option("--fault", options.fault, "The gripper's own, by the maker's code")->type_name("CODE")->check(CLI::Range(0, 255));
   CLI11_PARSE(app, argc, argv);
   for (int signal : {SIGINT, SIGTERM}) {
     std::signal(signal, [](int) { interrupted = 1; });

@@ -1,7 +1,6 @@
-// fingertip_cell_emulated: the world of one grasp, closed loop, whose fingertips are emulated boards with their release
-// image. It speaks the protocol of host_tools/simulation/emulator/lockstep.mjs on its standard input and output: the
-// cell, the gripper and the controller go on by slices of emulated time, after each of which the boards' bytes are
-// handed over.
+// fingertip_cell_emulated: the world of one grasp, closed loop, whose fingertips are emulated boards with their release image. It speaks
+// the protocol of host_tools/simulation/emulator/lockstep.mjs on its standard input and output: the cell, the gripper and the controller go
+// on by slices of emulated time, after each of which the boards' bytes are handed over.
 //
 // The controller takes what came in a slice at its end, so up to a slice late; all else is at its own time.
 #include "grasp/fingertip.hpp"
@@ -95,8 +94,7 @@ public:
     return frame_bytes(command);
   }
 
-  // Decodes what has come by now; calls the handler for each frame. Throws std::runtime_error where a command is
-  // refused.
+  // Decodes what has come by now; calls the handler for each frame. Throws std::runtime_error where a command is refused.
   template <typename Handler> void take(const Bytes &bytes, std::int64_t now_us, const Handler &handler) {
     decoder_.feed(bytes.data(), bytes.size(), [&](const wire_packet &packet) {
       if (packet.type == WIRE_ACK) {
@@ -195,8 +193,7 @@ public:
         return;
       }
       controller_->take_touch(finger, touch);
-      reports_.push_back({arrived_s, measured_s, finger, (touch.flags & CONTACT_FLAG_SLIDING) != 0,
-                          std::hypot(touch.qx_N, touch.qy_N)});
+      reports_.push_back({arrived_s, measured_s, finger, (touch.flags & CONTACT_FLAG_SLIDING) != 0, std::hypot(touch.qx_N, touch.qy_N)});
       frames_[finger]++;
       loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
       step_controller();
@@ -235,9 +232,7 @@ public:
 
   Bytes to_send(std::size_t finger) { return fingers_[finger].to_send(std::llround(1e6 * t_s_)); }
   // The present pressures of the sensors.
-  Pressures sensed_Pa(std::size_t finger) const {
-    return fingers_[finger].sensed_Pa(face_.base_Pa(cell_.patch(finger)));
-  }
+  Pressures sensed_Pa(std::size_t finger) const { return fingers_[finger].sensed_Pa(face_.base_Pa(cell_.patch(finger))); }
   bool over() const { return over_; }
 
   // What happened, and when, of the first slip after the lift:
@@ -445,12 +440,8 @@ int main(int argc, char **argv) {
                "a gripper and the controller. It is lifted, and its friction falls.",
                "fingertip_cell_emulated");
   fingertip::cell::Options options;
-  app.add_option("--friction-falls", options.friction_falls, "By this share")
-      ->check(CLI::Range(0.0, 0.9))
-      ->capture_default_str();
-  app.add_option("--slice-us", options.slice_us, "As the boards have it")
-      ->check(CLI::Range(100.0, 10000.0))
-      ->capture_default_str();
+  app.add_option("--friction-falls", options.friction_falls, "By this share")->check(CLI::Range(0.0, 0.9))->capture_default_str();
+  app.add_option("--slice-us", options.slice_us, "As the boards have it")->check(CLI::Range(100.0, 10000.0))->capture_default_str();
   app.add_option("--cache", options.cache, "Folder of the contact tables")->required();
   CLI11_PARSE(app, argc, argv);
   try {

@@ -11,8 +11,7 @@ extern "C" {
 namespace fingertip::cell {
 
 Face::Face(const std::string &name, double layer_mm, const std::filesystem::path &cache)
-    : layer_mm_(layer_mm),
-      table_(twin::ContactTable::load_or_build(twin::indenter(name), twin::silicone(layer_mm), cache)),
+    : layer_mm_(layer_mm), table_(twin::ContactTable::load_or_build(twin::indenter(name), twin::silicone(layer_mm), cache)),
       traction_(table_, twin::silicone(layer_mm)) {}
 
 Pressures Face::base_Pa(const Patch &patch) const {
@@ -32,8 +31,8 @@ Pressures Face::base_Pa(const Patch &patch) const {
   for (int i = 0; i < along; i++) {
     for (int j = 0; j < across; j++) {
       const double u = a_mm * ((2 * i + 1.0) / along - 1.0), v = b_mm * ((2 * j + 1.0) / across - 1.0);
-      const double held_in = 2.0 / (layer_mm_ * layer_mm_) * (a_mm * a_mm - u * u) * (b_mm * b_mm - v * v) /
-                             std::max(a_mm * a_mm + b_mm * b_mm, 1e-9);
+      const double held_in =
+          2.0 / (layer_mm_ * layer_mm_) * (a_mm * a_mm - u * u) * (b_mm * b_mm - v * v) / std::max(a_mm * a_mm + b_mm * b_mm, 1e-9);
       nodes.push_back({u, v, 1.0 + held_in});
       sum += nodes.back().weight;
     }
@@ -55,8 +54,8 @@ Pressures Face::base_Pa(const Patch &patch) const {
     const double share = node.weight / sum;
     if (share > 0.0) {
       const double u = node.u_mm - patch.off_length_mm, v = node.v_mm - patch.off_width_mm;
-      add({share * patch.force_N, patch.x_mm + c * u - s * v, patch.y_mm + s * u + c * v, patch.angle_rad,
-           share * patch.pull_x_N, share * patch.pull_y_N, share * patch.stuck_N},
+      add({share * patch.force_N, patch.x_mm + c * u - s * v, patch.y_mm + s * u + c * v, patch.angle_rad, share * patch.pull_x_N,
+           share * patch.pull_y_N, share * patch.stuck_N},
           base_Pa);
     }
   }

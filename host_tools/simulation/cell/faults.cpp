@@ -90,8 +90,7 @@ Faults::Line Faults::line(double t_s) {
   const bool one = random_.next() % 2 == 0, other = random_.next() % 2 == 0;
   const bool half = kind == Kind::garbage || kind == Kind::noisy;
   line.commands = kind != Kind::silent && kind != Kind::fault && (one || !half);
-  line.answers =
-      kind != Kind::silent && kind != Kind::garbage && kind != Kind::unanswered && (other || kind != Kind::noisy);
+  line.answers = kind != Kind::silent && kind != Kind::garbage && kind != Kind::unanswered && (other || kind != Kind::noisy);
   line.late_s = kind == Kind::late ? LATE_s : kind == Kind::latency_timer ? LATENCY_TIMER_s : 0.0;
   return line;
 }

@@ -42,20 +42,15 @@ public:
     }
     Packet answer = {.id = id_, .code = trouble_};
     switch (question.code) {
-    case PING:
-      break;
+    case PING: break;
     case READ:
       if (given.size() != 2 || all) {
         return {};
       }
       answer = read(given);
       break;
-    case WRITE:
-      write(given);
-      break;
-    case REG_WRITE:
-      waiting_ = given;
-      break;
+    case WRITE: write(given); break;
+    case REG_WRITE: waiting_ = given; break;
     case ACTION:
       write(waiting_);
       waiting_.clear();
@@ -64,8 +59,7 @@ public:
       for (std::size_t at = 2; given.size() > 2 && at + given[1] < given.size(); at += given[1] + 1u) {
         if (given[at] == id_) {
           Bytes own = {given[0]};
-          own.insert(own.end(), given.begin() + std::ptrdiff_t(at) + 1,
-                     given.begin() + std::ptrdiff_t(at) + 1 + given[1]);
+          own.insert(own.end(), given.begin() + std::ptrdiff_t(at) + 1, given.begin() + std::ptrdiff_t(at) + 1 + given[1]);
           write(own);
         }
       }
@@ -76,8 +70,7 @@ public:
       }
       answer = read(given);
       break;
-    default:
-      return {};
+    default: return {};
     }
     if (all && question.code != PING && question.code != SYNC_READ) {
       return {};

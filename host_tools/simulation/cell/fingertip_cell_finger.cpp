@@ -37,8 +37,7 @@ constexpr std::chrono::milliseconds ROUND{1};
 class Fingertip {
 public:
   Fingertip(const FingerProcess &finger, SharedPressures &pressures)
-      : finger_(finger), pressures_(pressures), pad_(pad::profile_over_own_sensors({finger.layer_mm, 0.0, false})),
-        port_(finger.link) {
+      : finger_(finger), pressures_(pressures), pad_(pad::profile_over_own_sensors({finger.layer_mm, 0.0, false})), port_(finger.link) {
     power_up();
   }
 
@@ -79,11 +78,10 @@ private:
     settings.noise = 1.0;
     settings.prom_spread = 0.03;
     settings.parallel_bus = finger_.parallel_bus;
-    settings.world = {this,
-                      [](void *context, unsigned sensor, std::uint64_t t_us) {
-                        return static_cast<Fingertip *>(context)->pressure_Pa(sensor, t_us);
-                      },
-                      nullptr};
+    settings.world = {
+        this,
+        [](void *context, unsigned sensor, std::uint64_t t_us) { return static_cast<Fingertip *>(context)->pressure_Pa(sensor, t_us); },
+        nullptr};
     if (!native_fingertip_start(&settings)) {
       throw Error("the firmware of this build does not start");
     }
@@ -104,8 +102,7 @@ private:
     stored.force_scale = 1.0F / pad_.force_ratio;
     stored.force_scale_sd = FORCE_SCALE_SD;
     for (std::size_t k = 0; k < SENSORS; k++) {
-      stored.sensors[k] = {static_cast<float>(finger_.gain[k] * (1.0 + sd * random.normal())), static_cast<float>(sd),
-                           0, 0, 0};
+      stored.sensors[k] = {static_cast<float>(finger_.gain[k] * (1.0 + sd * random.normal())), static_cast<float>(sd), 0, 0, 0};
     }
     order(command_calibrate(stored, SENSORS));
   }
@@ -171,8 +168,7 @@ private:
     }
     std::uint8_t bytes[NATIVE_CDC_RECEIVE_BYTES];
     if (const std::size_t count = port_.read(bytes, sizeof bytes)) {
-      asks_.feed(bytes, count,
-                 [this](const wire_packet &packet) { pressures_.rates_set += packet.type == WIRE_CMD_RATE; });
+      asks_.feed(bytes, count, [this](const wire_packet &packet) { pressures_.rates_set += packet.type == WIRE_CMD_RATE; });
       asked_.push_back({steady_now_us(), {bytes, bytes + count}});
     }
   }

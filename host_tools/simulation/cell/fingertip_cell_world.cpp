@@ -26,8 +26,7 @@ constexpr Known KNOWN[] = {{Event::Kind::pour, 0.0, 5.0, 1.0},
                            {Event::Kind::slick, 0.0, 0.95, 0.5}};
 
 Event event_of(Event::Kind kind, double begin_s, double amount) {
-  const auto known =
-      std::find_if(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return one.kind == kind; });
+  const auto known = std::find_if(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return one.kind == kind; });
   return {kind, begin_s, known->seconds, amount};
 }
 
@@ -45,19 +44,16 @@ Planned planned(const std::string &text) {
   const std::size_t colon = text.find(':'), at = text.find('@');
   if (colon != std::string::npos) {
     const std::string name = text.substr(0, colon);
-    const auto amount =
-        to_double(std::string_view(text).substr(colon + 1, at == std::string::npos ? at : at - colon - 1));
+    const auto amount = to_double(std::string_view(text).substr(colon + 1, at == std::string::npos ? at : at - colon - 1));
     const auto after_s = at == std::string::npos ? 0.0 : to_double(std::string_view(text).substr(at + 1));
     const Known *known = find_in(KNOWN, [&](const Known &one) { return name == name_of(one.kind); });
-    if (known && amount && *amount >= known->low && *amount <= known->high && after_s && *after_s >= 0.0 &&
-        *after_s <= 1e6) {
+    if (known && amount && *amount >= known->low && *amount <= known->high && after_s && *after_s >= 0.0 && *after_s <= 1e6) {
       return {known->kind, *amount, *after_s};
     }
   }
-  throw Error(ErrorCode::bad_value,
-              "\"" + text +
-                  "\" is no disturbance; give pour:0..5 (masses), jerk:0..20 (m/s2), knock:0..0.5 "
-                  "(m/s) or slick:0..0.95 (share of friction), and @SECONDS after the lift");
+  throw Error(ErrorCode::bad_value, "\"" + text +
+                                        "\" is no disturbance; give pour:0..5 (masses), jerk:0..20 (m/s2), knock:0..0.5 "
+                                        "(m/s) or slick:0..0.95 (share of friction), and @SECONDS after the lift");
 }
 
 bool is_disturbance(const std::string &name) {
@@ -153,9 +149,7 @@ void World::watch_object() {
   }
 }
 
-Pressures World::pressures_Pa(std::size_t finger) const {
-  return is_there_ ? face_.base_Pa(cell_.patch(finger)) : Pressures{};
-}
+Pressures World::pressures_Pa(std::size_t finger) const { return is_there_ ? face_.base_Pa(cell_.patch(finger)) : Pressures{}; }
 
 const char *World::columns() {
   return "world_s,width_mm,force_N,peak_N,load_N,least_N,slid_mm,way_mm,friction,lifted_mm,slips,"
@@ -172,8 +166,8 @@ std::string World::cells() const {
   const double least_N = is_there_ && since_s >= grasp_.lift_s ? need_N(since_s) : 0.0;
   const double friction = 0.5 * (cell_.friction(0) + cell_.friction(1));
   std::string text = fixed(time_s_, 5);
-  for (const double value : {motion_.width_mm(), is_there_ ? cell_.mean_N() : 0.0, peak_N_, load_N, least_N,
-                             cell_.slid_mm(), -cell_.way_mm().y, friction, grasp_.inputs(since_s).lifted_mm}) {
+  for (const double value : {motion_.width_mm(), is_there_ ? cell_.mean_N() : 0.0, peak_N_, load_N, least_N, cell_.slid_mm(),
+                             -cell_.way_mm().y, friction, grasp_.inputs(since_s).lifted_mm}) {
     text += "," + fixed(value, 4);
   }
   for (const bool value : {is_there_ && cell_.slips(), is_there_, is_dropped_, is_crushed_}) {

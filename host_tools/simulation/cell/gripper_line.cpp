@@ -26,8 +26,7 @@ GripperLine::Answer GripperLine::exchange(const GripCommand &command) {
   if (command.motion == GRIP_ACTIVATE && sent_.motion != GRIP_ACTIVATE) {
     motion_.activate();
     sent_ = command;
-  } else if (command.motion == GRIP_MOVE &&
-             (command.width_mm != sent_.width_mm || command.speed_mm_s != sent_.speed_mm_s)) {
+  } else if (command.motion == GRIP_MOVE && (command.width_mm != sent_.width_mm || command.speed_mm_s != sent_.speed_mm_s)) {
     motion_.move(command);
     sent_ = command;
   }

@@ -35,12 +35,10 @@ GripperMechanics gripper_mechanics(const std::string &model) {
 }
 
 GripperMotion::GripperMotion(const GripperMechanics &mechanics)
-    : mechanics_(mechanics), phase_(Phase::off), drive_mm_(mechanics.traits.stroke_mm), fingers_mm_(drive_mm_),
-      target_mm_(drive_mm_), speed_mm_s_(mechanics.traits.speed_max_mm_s), force_N_(mechanics.traits.force_max_N) {}
+    : mechanics_(mechanics), phase_(Phase::off), drive_mm_(mechanics.traits.stroke_mm), fingers_mm_(drive_mm_), target_mm_(drive_mm_),
+      speed_mm_s_(mechanics.traits.speed_max_mm_s), force_N_(mechanics.traits.force_max_N) {}
 
-bool GripperMotion::blocks(double width_mm, double force_N) const {
-  return blocked_at && blocked_at(width_mm, force_N);
-}
+bool GripperMotion::blocks(double width_mm, double force_N) const { return blocked_at && blocked_at(width_mm, force_N); }
 
 double GripperMotion::nearest_step_mm(double width_mm) const {
   const GripperTraits &traits = mechanics_.traits;
@@ -73,8 +71,7 @@ void GripperMotion::power_off() {
 }
 
 void GripperMotion::move(const GripperMove &move) {
-  const bool same = asked_ && asked_->width_mm == move.width_mm && asked_->speed_mm_s == move.speed_mm_s &&
-                    asked_->force_N == move.force_N;
+  const bool same = asked_ && asked_->width_mm == move.width_mm && asked_->speed_mm_s == move.speed_mm_s && asked_->force_N == move.force_N;
   if (active() && !same) {
     asked_ = move;
     commands_.push_back({time_s_ + mechanics_.traits.latency_s, false, move});
@@ -122,9 +119,7 @@ void GripperMotion::drive_to(double target_mm, double speed_mm_s, double force_N
   const double from_mm = drive_mm_;
   /* Where the fingers will be, the drive having gone so far: an object pushes them apart. */
   const double play_mm = direction < 0 ? mechanics_.backlash_mm / 2 : -mechanics_.backlash_mm / 2;
-  const auto is_blocked = [&](double gone_mm) {
-    return blocks(from_mm + direction * gone_mm + play_mm, -direction * force_N);
-  };
+  const auto is_blocked = [&](double gone_mm) { return blocks(from_mm + direction * gone_mm + play_mm, -direction * force_N); };
   blocked_ = 0;
   if (way_mm == 0.0) {
     return;

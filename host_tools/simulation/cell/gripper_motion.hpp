@@ -9,10 +9,9 @@
 //     squeeze(motion.width_mm());
 //   }
 //
-// A command counts after the latency, and one that came later replaces it only after its own.
-// Fingers run at constant speed to the nearest step and stop at once; what accelerates is not
-// modelled, and nothing but backlash lets an object push them apart: a 2F-85's screw holds, a
-// servo would yield. Latencies and the servo's backlash are assumptions, no measurements.
+// A command counts after the latency, and one that came later replaces it only after its own. Fingers run at constant speed to the nearest
+// step and stop at once; what accelerates is not modelled, and nothing but backlash lets an object push them apart: a 2F-85's screw holds,
+// a servo would yield. Latencies and the servo's backlash are assumptions, no measurements.
 #pragma once
 
 #include "grasp/gripper/gripper.hpp"
@@ -44,8 +43,7 @@ public:
   // Empty: nothing is there.
   std::function<bool(double width_mm, double force_N)> blocked_at;
 
-  // Where its ends are searched, opens and closes fully, at whatever force, so that what is held
-  // falls; then it takes moves.
+  // Where its ends are searched, opens and closes fully, at whatever force, so that what is held falls; then it takes moves.
   void activate();
   // Power is lost: the fingers stay, commands do nothing until activate.
   void power_off();

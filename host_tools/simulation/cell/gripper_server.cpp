@@ -53,22 +53,15 @@ void GripperServer::take() {
       continue;
     }
     switch (fault) {
-    case LineFault::silent:
-      bytes.clear();
-      break;
+    case LineFault::silent: bytes.clear(); break;
     case LineFault::garbage:
       for (std::size_t i = 0; i < bytes.size(); i++) {
         bytes[i] = static_cast<std::uint8_t>(17 + 91 * i);
       }
       break;
-    case LineFault::damaged:
-      bytes.back() ^= 0x10;
-      break;
-    case LineFault::other_slave:
-      bytes = slave_->of_other_slave(bytes);
-      break;
-    default:
-      break;
+    case LineFault::damaged: bytes.back() ^= 0x10; break;
+    case LineFault::other_slave: bytes = slave_->of_other_slave(bytes); break;
+    default: break;
     }
     const auto seconds = [](double time_s) {
       return std::chrono::duration_cast<HostTime::duration>(std::chrono::duration<double>(time_s));

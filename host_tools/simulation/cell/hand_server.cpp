@@ -42,15 +42,14 @@ std::string HandServer::obey(int client, const std::string &line) {
   }
   const bool is_press = verb == "press" && are_numbers && values[2] >= 0.0;
   if (finger == fingertips_ || (!is_press && verb != "lift") || words >> rest) {
-    return "give press SIDE X_mm Y_mm FORCE_N or lift SIDE; SIDE is left" +
-           std::string(fingertips_ > 1 ? " or right" : "");
+    return "give press SIDE X_mm Y_mm FORCE_N or lift SIDE; SIDE is left" + std::string(fingertips_ > 1 ? " or right" : "");
   }
   if (!obeys_) {
     return "no hand presses here; start fingertip simulate --mouse";
   }
   if (is_press) {
-    hands_[finger] = {HandAt{std::clamp(values[0], -FARTHEST_mm, FARTHEST_mm),
-                             std::clamp(values[1], -FARTHEST_mm, FARTHEST_mm), std::min(values[2], MOST_N)},
+    hands_[finger] = {HandAt{std::clamp(values[0], -FARTHEST_mm, FARTHEST_mm), std::clamp(values[1], -FARTHEST_mm, FARTHEST_mm),
+                             std::min(values[2], MOST_N)},
                       client};
   } else {
     hands_[finger] = {};

@@ -1,6 +1,5 @@
-// A hand from outside on simulated fingertips, and what is true of them, over a Unix socket:
-// `truth` in the folder of the simulated ports. Where a hand is obeyed, its name `hand` leads there
-// too. `fingertip web` is its client (web/server/simulations.hpp). Lines of text:
+// A hand from outside on simulated fingertips, and what is true of them, over a Unix socket: `truth` in the folder of the simulated ports.
+// Where a hand is obeyed, its name `hand` leads there too. `fingertip web` is its client (web/server/simulations.hpp). Lines of text:
 //
 //   press SIDE X_mm Y_mm FORCE_N        SIDE: left or right; 0 to 50 N. So it stays until another line
 //   lift SIDE

@@ -46,8 +46,8 @@ class Tip {
 public:
   Tip(const KindTrial &trial, std::size_t finger)
       : pad_(trial.grasp.pads[finger]), mirror_(finger == 0 ? 1.0 : -1.0), load_share_(trial.load_share),
-        sigma_mm_(sigma_of(trial.grasp.shape)), noise_(trial.noise), period_s_(1.0 / trial.rate_Hz),
-        random_(trial.seed, TIP, finger), next_s_(random_.uniform(0.0, period_s_)) {
+        sigma_mm_(sigma_of(trial.grasp.shape)), noise_(trial.noise), period_s_(1.0 / trial.rate_Hz), random_(trial.seed, TIP, finger),
+        next_s_(random_.uniform(0.0, period_s_)) {
     settings_.force_scale = settings_.tangential_scale = 1.0F;
   }
   double next_s() const { return next_s_; }
@@ -55,17 +55,16 @@ public:
   bool is_lost(double share) { return random_.uniform(0.0, 1.0) < share; }
   // From next_s on its way.
   double known_s(double jitter_s, double later_s) {
-    known_s_ =
-        std::max(known_s_, next_s_ + 0.5 * std::min(CONVERSION_s, period_s_) + std::min(PROCESSING_s, period_s_) +
-                               pad_.delay_s + later_s + jitter_s * std::abs(random_.normal()));
+    known_s_ = std::max(known_s_, next_s_ + 0.5 * std::min(CONVERSION_s, period_s_) + std::min(PROCESSING_s, period_s_) + pad_.delay_s +
+                                      later_s + jitter_s * std::abs(random_.normal()));
     return known_s_;
   }
 
   GripTouch measure(double force_N, const Vector &load_N, const Vector &way_mm) {
     GripTouch touch{};
     touch.t_s = next_s_;
-    const double sensed_N = pad_.gain * force_N * (1.0 + noise_ * FORCE_NOISE * random_.normal()) +
-                            noise_ * FORCE_NOISE_N * random_.normal();
+    const double sensed_N =
+        pad_.gain * force_N * (1.0 + noise_ * FORCE_NOISE * random_.normal()) + noise_ * FORCE_NOISE_N * random_.normal();
     contact_input input{};
     input.t_us = in_us(next_s_);
     input.contact = sensed_N > GATE_N;
@@ -90,9 +89,8 @@ public:
       found.location_noise_mm = static_cast<float>(PLACE_NOISE_mm);
       found.location_sd_mm = 0.1F;
       input.tangential = has_load ? &found : nullptr;
-      result.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                     CONTACT_FLAG_TARED | CONTACT_FLAG_CALIBRATED |
-                     std::uint32_t{has_load ? CONTACT_FLAG_TANGENTIAL_VALID : CONTACT_FLAG_UNCERTAIN};
+      result.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TARED |
+                     CONTACT_FLAG_CALIBRATED | std::uint32_t{has_load ? CONTACT_FLAG_TANGENTIAL_VALID : CONTACT_FLAG_UNCERTAIN};
       float slip_mm = 0.0F;
       if (slip_update(&slips_, input.t_us, found.x_mm, found.y_mm, SLIP_WINDOW_us, &slip_mm) && slip_mm > SLIP_mm) {
         result.flags |= CONTACT_FLAG_SLIP;
@@ -176,8 +174,8 @@ public:
       : trial_(trial), grasp_(trial.grasp), controller_(controller), trace_(trace), cell_(grasp_),
         gripper_(slowed(trial), trial.activates ? trial.gripper.traits.stroke_mm : grasp_.width_mm + grasp_.opens_mm,
                  Random(trial.seed, LINE, 0)),
-        tips_{Tip(trial, 0), Tip(trial, 1)}, faults_(trial.fault.value_or(Fault()), Random(trial.seed, FAULT, 0)),
-        set_point_(trial), is_between_(!trial.activates) {
+        tips_{Tip(trial, 0), Tip(trial, 1)}, faults_(trial.fault.value_or(Fault()), Random(trial.seed, FAULT, 0)), set_point_(trial),
+        is_between_(!trial.activates) {
     if (trial.activates) {
       gripper_.motion().power_off();
     }
@@ -353,8 +351,7 @@ private:
       const Vector way = cell_.way_mm();
       outcome_.dropped = cell_.slid_mm() >= DROP_mm || std::hypot(way.x, way.y) >= DROP_mm;
     }
-    const bool waited =
-        trial_.still_s > 0.0 && (t_s_ >= touched_s_ + trial_.still_s || t_s_ > trial_.still_s + PATIENCE_s);
+    const bool waited = trial_.still_s > 0.0 && (t_s_ >= touched_s_ + trial_.still_s || t_s_ > trial_.still_s + PATIENCE_s);
     over_ = outcome_.dropped || outcome_.never_held || waited || (lifts && since_s >= grasp_.ends_s);
     if (trial_.fault) {
       fail();
@@ -399,8 +396,7 @@ private:
   KindOutcome outcome() {
     outcome_.step_us = stepping_us_ / std::max(steps_, 1.0);
     outcome_.slides = report_.slides;
-    outcome_.friction =
-        report_.friction / (0.5 * inputs().friction_share * (grasp_.pads[0].friction + grasp_.pads[1].friction));
+    outcome_.friction = report_.friction / (0.5 * inputs().friction_share * (grasp_.pads[0].friction + grasp_.pads[1].friction));
     outcome_.slid_mm = cell_.slid_mm();
     outcome_.crushed = outcome_.peak_N > grasp_.crushes_N;
     outcome_.catches = slips_.slips;

@@ -34,9 +34,7 @@ public:
 // The controller of grasp/control, grasping from the first step on.
 class CoreController : public Controller {
 public:
-  CoreController(const GripSettings &settings, const GripperTraits &traits) : core_(settings, traits) {
-    core_.request(GRIP_REQUEST_GRASP);
-  }
+  CoreController(const GripSettings &settings, const GripperTraits &traits) : core_(settings, traits) { core_.request(GRIP_REQUEST_GRASP); }
   void take_touch(std::size_t finger, const GripTouch &touch) override { core_.take(finger, touch); }
   void take_status(const GripperStatus &status) override { core_.take(status); }
   GripReport step(double now_s, GripCommand &command) override { return core_.step(now_s, command); }
@@ -67,9 +65,8 @@ struct KindTrial {
   double asked_after_s = 0.0;
   // This time after the lift began friction falls a tenth below the value that holds the object.
   std::optional<double> slick_after_s;
-  // The trial ends when the fault has been watched. Where nothing is lifted by then, the hand lifts 0.8 s
-  // after it began; after 1.2 s as much mass again is poured in, unless the fault is not followed by that: any
-  // controller would then like more force.
+  // The trial ends when the fault has been watched. Where nothing is lifted by then, the hand lifts 0.8 s after it began; after 1.2 s as
+  // much mass again is poured in, unless the fault is not followed by that: any controller would then like more force.
   std::optional<Fault> fault;
 };
 

@@ -46,9 +46,8 @@ struct Fragile {
   Range mass_kg;
   double crushes_N;
 };
-constexpr Fragile FRAGILE[] = {{"egg", Shape::egg, {0.05, 0.07}, 25.0},
-                               {"strawberry", Shape::ball, {0.015, 0.035}, 5.0},
-                               {"cup", Shape::cup, {0.01, 0.05}, 3.0}};
+constexpr Fragile FRAGILE[] = {
+    {"egg", Shape::egg, {0.05, 0.07}, 25.0}, {"strawberry", Shape::ball, {0.015, 0.035}, 5.0}, {"cup", Shape::cup, {0.01, 0.05}, 3.0}};
 constexpr std::array<Shape, 5> DRAWN = {Shape::ball, Shape::box, Shape::plate, Shape::upright, Shape::lying};
 
 // What a shape does to a pad that was drawn under a ball, and how often it is drawn. A line of 30 mm on 12 mm of
@@ -58,9 +57,8 @@ struct Stiffer {
   const char *name;
   double times, of_exponent, shear;
 };
-constexpr Stiffer STIFFER[] = {{"ball", 1.0, 1.0, 1.0},  {"egg", 1.0, 1.0, 1.0},     {"box", 8.0, 0.3, 3.0},
-                               {"plate", 8.0, 0.3, 3.0}, {"upright", 3.0, 0.6, 2.0}, {"lying", 3.0, 0.6, 2.0},
-                               {"cup", 3.0, 0.6, 2.0}};
+constexpr Stiffer STIFFER[] = {{"ball", 1.0, 1.0, 1.0},    {"egg", 1.0, 1.0, 1.0},   {"box", 8.0, 0.3, 3.0}, {"plate", 8.0, 0.3, 3.0},
+                               {"upright", 3.0, 0.6, 2.0}, {"lying", 3.0, 0.6, 2.0}, {"cup", 3.0, 0.6, 2.0}};
 
 // Acceleration of the minimum-jerk way of unit length and time is at most this.
 constexpr double EASED_ACCELERATION = 5.7735;
@@ -83,8 +81,7 @@ Event draw_event(Random &random, std::size_t of, double begin_s, bool calm) {
   Event event{};
   event.begin_s = begin_s;
   event.angle_rad = random.uniform(-M_PI, M_PI);
-  event.kind =
-      calm ? (random.next() % 2 ? Event::Kind::carry : Event::Kind::push) : static_cast<Event::Kind>(random.next() % 6);
+  event.kind = calm ? (random.next() % 2 ? Event::Kind::carry : Event::Kind::push) : static_cast<Event::Kind>(random.next() % 6);
   const Drawn &drawn = DRAWN_EVENTS[static_cast<std::size_t>(event.kind)];
   event.amount = ALL.strength[of] * draw(random, drawn.amount);
   event.seconds = draw(random, drawn.seconds);
@@ -208,26 +205,15 @@ KindOfGrasp::Inputs KindOfGrasp::inputs(double t_s) const {
     const Vector way{std::sin(event.angle_rad), std::cos(event.angle_rad)};
     double hand_m_s2 = 0.0, push_N = 0.0;
     switch (event.kind) {
-    case Event::Kind::knock:
-      push_N = lasts ? mass_kg * event.amount * 0.5 * M_PI / event.seconds * std::sin(M_PI * share) : 0.0;
-      break;
+    case Event::Kind::knock: push_N = lasts ? mass_kg * event.amount * 0.5 * M_PI / event.seconds * std::sin(M_PI * share) : 0.0; break;
     case Event::Kind::push:
       push_N = lasts ? event.amount * mass_kg * GRAVITY_m_s2 * std::min(1.0, 8.0 * std::min(share, 1.0 - share)) : 0.0;
       break;
-    case Event::Kind::vibrate:
-      hand_m_s2 = lasts ? event.amount * std::sin(2.0 * M_PI * event.rate_Hz * share * event.seconds) : 0.0;
-      break;
-    case Event::Kind::pour:
-      inputs.mass_kg += event.amount * mass_kg * way_of(share);
-      break;
-    case Event::Kind::carry:
-      hand_m_s2 = event.amount / EASED_ACCELERATION * acceleration_of(share);
-      break;
-    case Event::Kind::slick:
-      inputs.friction_share *= 1.0 - event.amount * way_of(share);
-      break;
-    case Event::Kind::jerk:
-      hand_m_s2 = lasts ? event.amount * std::sin(2.0 * M_PI * share) : 0.0;
+    case Event::Kind::vibrate: hand_m_s2 = lasts ? event.amount * std::sin(2.0 * M_PI * event.rate_Hz * share * event.seconds) : 0.0; break;
+    case Event::Kind::pour: inputs.mass_kg += event.amount * mass_kg * way_of(share); break;
+    case Event::Kind::carry: hand_m_s2 = event.amount / EASED_ACCELERATION * acceleration_of(share); break;
+    case Event::Kind::slick: inputs.friction_share *= 1.0 - event.amount * way_of(share); break;
+    case Event::Kind::jerk: hand_m_s2 = lasts ? event.amount * std::sin(2.0 * M_PI * share) : 0.0;
     }
     inputs.hand_m_s2.x += hand_m_s2 * way.x;
     inputs.hand_m_s2.y += hand_m_s2 * way.y;

@@ -29,8 +29,7 @@ enum class Shape {
   lying,   // cylinder, its axis level and along the pads
   cup,     // an upright cylinder: its cone is left out
 };
-constexpr std::array<Shape, 7> SHAPES = {Shape::ball,    Shape::egg,   Shape::box, Shape::plate,
-                                         Shape::upright, Shape::lying, Shape::cup};
+constexpr std::array<Shape, 7> SHAPES = {Shape::ball, Shape::egg, Shape::box, Shape::plate, Shape::upright, Shape::lying, Shape::cup};
 const char *name_of(Shape shape);
 // Throws std::runtime_error: there is none.
 Shape shape_of(const std::string &name);
@@ -78,12 +77,12 @@ struct KindOfGrasp {
   Vector place_mm;                          // of the middle on fingertip 0, in its own x and y
   double down_rad = -M_PI_2;                // gravity there, from x towards y
   std::array<KindOfPad, 2> pads;
-  double exponent = 1.6;                 // of force over indentation
-  double shear_N_mm = 3.5;               // tangential stiffness of a pad at 4 N
-  double rubber_N_s_mm = 0.008;          // damping of it, with the loss at the contact's edge
-  double kinetic_share = 0.8;            // of static friction, at speed
-  double stribeck_mm_s = 3.0;            // at which friction has fallen by 63 % of the way there
-  double width_mm = 40.0, mass_kg = 0.3; // width: along the grip's axis
+  double exponent = 1.6;                                           // of force over indentation
+  double shear_N_mm = 3.5;                                         // tangential stiffness of a pad at 4 N
+  double rubber_N_s_mm = 0.008;                                    // damping of it, with the loss at the contact's edge
+  double kinetic_share = 0.8;                                      // of static friction, at speed
+  double stribeck_mm_s = 3.0;                                      // at which friction has fallen by 63 % of the way there
+  double width_mm = 40.0, mass_kg = 0.3;                           // width: along the grip's axis
   double stiffness_N_mm = std::numeric_limits<double>::infinity(); // of the object, when squeezed
   double off_mm = 0.0;                                             // from the middle between the fingers
   double table_friction = 0.4;

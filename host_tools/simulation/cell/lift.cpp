@@ -109,9 +109,8 @@ void open_gripper(GripperServer &server, GripperMotion &motion, const std::strin
 class Lift {
 public:
   Lift(const LiftOptions &options, const Place &place)
-      : options_(options), place_(place), face_(options.face, LAYER_mm, options.cache),
-        fingers_(place, fingers_of(options, place)), motion_(GripperServer::mechanics(options.model)),
-        server_(motion_, server_options()) {
+      : options_(options), place_(place), face_(options.face, LAYER_mm, options.cache), fingers_(place, fingers_of(options, place)),
+        motion_(GripperServer::mechanics(options.model)), server_(motion_, server_options()) {
     fingers_.wait_until_ready();
     open_gripper(server_, motion_, options.model, options.world.grasp.width_mm + options.opens_mm);
     server_.rename(place.port("gripper"));
@@ -123,8 +122,7 @@ public:
   }
 
   void run() {
-    std::printf("ready: %s, %s, %s\n", place_.port(SIDES[0]).c_str(), place_.port(SIDES[1]).c_str(),
-                place_.port("gripper").c_str());
+    std::printf("ready: %s, %s, %s\n", place_.port(SIDES[0]).c_str(), place_.port(SIDES[1]).c_str(), place_.port("gripper").c_str());
     std::fflush(stdout);
     const std::int64_t began_us = steady_now_us();
     last_us_ = began_us;
@@ -153,11 +151,9 @@ private:
   std::string head() const {
     const KindOfGrasp &grasp = options_.world.grasp;
     std::ostringstream text;
-    text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: " << options_.model
-         << "\n# face: " << options_.face
-         << "\n# kind: " << (options_.world.kind ? name_of(*options_.world.kind) : "none")
-         << "\n# shape: " << name_of(grasp.shape) << "\n# width_mm: " << grasp.width_mm
-         << "\n# mass_kg: " << grasp.mass_kg << "\n# friction: " << grasp.pads[0].friction << ", "
+    text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: " << options_.model << "\n# face: " << options_.face
+         << "\n# kind: " << (options_.world.kind ? name_of(*options_.world.kind) : "none") << "\n# shape: " << name_of(grasp.shape)
+         << "\n# width_mm: " << grasp.width_mm << "\n# mass_kg: " << grasp.mass_kg << "\n# friction: " << grasp.pads[0].friction << ", "
          << grasp.pads[1].friction << "\n# crushes_N: " << grasp.crushes_N << "\n# seed: " << options_.seed << "\n";
     return text.str();
   }
@@ -165,11 +161,8 @@ private:
   // Somebody is late, and has not been for too long.
   bool is_waited_for(std::int64_t now_us) const {
     const auto patience_us = static_cast<std::int64_t>(1e6 * options_.patience_s);
-    const auto is_late = [&](std::int64_t seen_us) {
-      return now_us - seen_us > LATE_us && now_us - seen_us < patience_us;
-    };
-    const std::int64_t heard_us =
-        std::chrono::duration_cast<std::chrono::microseconds>(server_.heard_at().time_since_epoch()).count();
+    const auto is_late = [&](std::int64_t seen_us) { return now_us - seen_us > LATE_us && now_us - seen_us < patience_us; };
+    const std::int64_t heard_us = std::chrono::duration_cast<std::chrono::microseconds>(server_.heard_at().time_since_epoch()).count();
     bool is_late_one = is_late(heard_us);
     for (std::size_t i = 0; i < FINGERS; i++) {
       is_late_one = is_late_one || (fingers_.is_there(i) && !fingers_.is_frozen(i) && is_late(fingers_.reached_us(i)));
@@ -215,8 +208,7 @@ private:
     if (server_of_truth_->is_due(now_us)) {
       for (std::size_t i = 0; i < FINGERS; i++) {
         const twin::Touch touch = world_->patch(i);
-        server_of_truth_->send(i, fingers_.device_us(i, now_us),
-                               {{touch.x_mm, touch.y_mm, touch.force_N}, touch.pull_x_N, touch.pull_y_N});
+        server_of_truth_->send(i, fingers_.device_us(i, now_us), {{touch.x_mm, touch.y_mm, touch.force_N}, touch.pull_x_N, touch.pull_y_N});
       }
     }
   }
@@ -295,10 +287,9 @@ private:
     return true;
   }
 
-  static constexpr const char *COMMANDS =
-      "give lift, take, pour|jerk|knock|slick AMOUNT once it is lifted, kill|freeze|thaw "
-      "left|right, line none|silent|garbage|damaged|other_slave|refused, late MS, latency_timer "
-      "MS, power on|off, fault CODE, at_touch COMMAND; COMMAND..., truth, or quit";
+  static constexpr const char *COMMANDS = "give lift, take, pour|jerk|knock|slick AMOUNT once it is lifted, kill|freeze|thaw "
+                                          "left|right, line none|silent|garbage|damaged|other_slave|refused, late MS, latency_timer "
+                                          "MS, power on|off, fault CODE, at_touch COMMAND; COMMAND..., truth, or quit";
 
   const LiftOptions &options_;
   const Place &place_;
@@ -331,8 +322,8 @@ void check(const LiftOptions &options) {
   const GripperTraits &traits = gripper_traits(options.model);
   const double widest_mm = options.world.grasp.width_mm + options.opens_mm;
   if (widest_mm > traits.stroke_mm) {
-    throw Error(ErrorCode::bad_value, options.model + " opens to " + fixed(traits.stroke_mm, 1) +
-                                          " mm; the object and --opens take " + fixed(widest_mm, 1));
+    throw Error(ErrorCode::bad_value,
+                options.model + " opens to " + fixed(traits.stroke_mm, 1) + " mm; the object and --opens take " + fixed(widest_mm, 1));
   }
 }
 

@@ -1,5 +1,4 @@
-// `fingertip simulate --lift`: an object between two fingertips on a gripper, which
-// `fingertip grasp` grasps and a hand then lifts.
+// `fingertip simulate --lift`: an object between two fingertips on a gripper, which `fingertip grasp` grasps and a hand then lifts.
 //
 // Physics and gripper run in this process, a fingertip's firmware in each of two others. Time that
 // this process is held up is none for the world, nor is time in which the others are waited for:

@@ -31,8 +31,7 @@ constexpr std::size_t ROWS_BYTES = 4096;
 
 volatile std::sig_atomic_t interrupted = 0;
 
-Place::Place(const std::string &folder)
-    : folder_(folder.empty() ? simulated_folder() : folder), is_shared_(folder.empty()) {
+Place::Place(const std::string &folder) : folder_(folder.empty() ? simulated_folder() : folder), is_shared_(folder.empty()) {
   std::error_code error;
   if (is_shared_) {
     make_own_folder(own_share_folder());
@@ -65,8 +64,7 @@ FingerProcess Place::finger(std::size_t side, std::uint64_t seed) const {
   return finger;
 }
 
-Fingers::Fingers(const Place &place, const std::vector<FingerProcess> &fingers)
-    : fingers_(fingers), processes_(fingers.size()) {
+Fingers::Fingers(const Place &place, const std::vector<FingerProcess> &fingers) : fingers_(fingers), processes_(fingers.size()) {
   if (place.is_shared()) {
     server_.emplace(Server::Options{own_share_folder(), {}}, [](const std::string &line) {
       if (line.find(": shared as ") == std::string::npos) {
@@ -74,8 +72,7 @@ Fingers::Fingers(const Place &place, const std::vector<FingerProcess> &fingers)
       }
     });
   }
-  void *memory =
-      mmap(nullptr, count() * sizeof(SharedPressures), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  void *memory = mmap(nullptr, count() * sizeof(SharedPressures), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) {
     throw std::bad_alloc();
   }

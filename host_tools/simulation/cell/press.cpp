@@ -45,8 +45,7 @@ class Pressed {
 public:
   Pressed(const Face &face, const PressOptions &options, std::uint64_t seed)
       : face_(face), weight_N_(1e-3 * options.weight_g * GRAVITY_m_s2),
-        rubber_(twin::parse_effects("memory,aftereffect"), SENSORS, LAYER_mm, AIR_Pa, seed), base_Pa_(SENSORS),
-        sensed_Pa_(SENSORS) {
+        rubber_(twin::parse_effects("memory,aftereffect"), SENSORS, LAYER_mm, AIR_Pa, seed), base_Pa_(SENSORS), sensed_Pa_(SENSORS) {
     Random random(seed, PLACES, 0);
     begin_x_ = random.uniform(0.0, 1.0);
     begin_y_ = random.uniform(0.0, 1.0);
@@ -60,8 +59,7 @@ public:
     touch_ = {};
     touch_.x_mm = HALF_WIDTH_mm * (2.0 * std::fmod(begin_x_ + spread(place, 2), 1.0) - 1.0);
     touch_.y_mm = HALF_LENGTH_mm * (2.0 * std::fmod(begin_y_ + spread(place, 3), 1.0) - 1.0);
-    touch_.force_N =
-        weight_N_ * (smooth(since_s / SETS_DOWN_s) - smooth((since_s - SETS_DOWN_s - HOLDS_s) / SETS_DOWN_s));
+    touch_.force_N = weight_N_ * (smooth(since_s / SETS_DOWN_s) - smooth((since_s - SETS_DOWN_s - HOLDS_s) / SETS_DOWN_s));
     feel(time_s);
   }
   // Follows the hand instead.
@@ -127,8 +125,7 @@ std::vector<FingerProcess> fingers_of(const PressOptions &options, const Place &
 
 std::string head_of(const PressOptions &options, const std::vector<FingerProcess> &fingers) {
   std::ostringstream text;
-  text << "# simulated: the truth of presses; time_us is CLOCK_MONOTONIC\n# weight_g: " << options.weight_g
-       << "\n# seed: " << options.seed;
+  text << "# simulated: the truth of presses; time_us is CLOCK_MONOTONIC\n# weight_g: " << options.weight_g << "\n# seed: " << options.seed;
   for (std::size_t i = 0; i < fingers.size(); i++) {
     text << "\n# gain_" << SIDES[i] << ":";
     for (double gain : fingers[i].gain) {

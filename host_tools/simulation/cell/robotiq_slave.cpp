@@ -1,9 +1,8 @@
 // A simulated Robotiq gripper: a Modbus slave and registers (gripper/robotiq_registers.hpp) over its motion.
 //
-// After the manuals: activation begins where rACT rises and takes its time; a move before gives gFLT 7, one while
-// it goes on gFLT 5 and is done afterwards. Assumed, for nothing is public: gFLT 9 is reported once, by the first
-// answer after a second of silence, and what moves goes on; a move begins where a register of it changes or rGTO
-// rises. Left out: automatic release, which the driver never asks for.
+// After the manuals: activation begins where rACT rises and takes its time; a move before gives gFLT 7, one while it goes on gFLT 5 and is
+// done afterwards. Assumed, for nothing is public: gFLT 9 is reported once, by the first answer after a second of silence, and what moves
+// goes on; a move begins where a register of it changes or rGTO rises. Left out: automatic release, which the driver never asks for.
 #include "grasp/gripper/robotiq_registers.hpp"
 #include "simulation/cell/gripper_server.hpp"
 
@@ -24,8 +23,7 @@ constexpr std::uint8_t ILLEGAL_FUNCTION = 1;
 class RobotiqSlave : public GripperServer::Slave {
 public:
   RobotiqSlave(GripperMotion &motion, const GripperServer::Options &options)
-      : motion_(motion), functions_(options.functions),
-        slave_(static_cast<std::uint8_t>(options.slave == 0 ? SLAVE : options.slave)) {}
+      : motion_(motion), functions_(options.functions), slave_(static_cast<std::uint8_t>(options.slave == 0 ? SLAVE : options.slave)) {}
 
   double baud() const override { return BAUD; }
 
@@ -165,13 +163,10 @@ private:
                      : motion_.blocked() > 0   ? STOPPED_OPENING
                      : motion_.blocked() < 0   ? STOPPED_CLOSING
                                                : AT_REQUEST;
-    const long count =
-        CLOSED_COUNT - std::lround(motion_.reported_width_mm() / traits.stroke_mm * (CLOSED_COUNT - OPEN_COUNT));
+    const long count = CLOSED_COUNT - std::lround(motion_.reported_width_mm() / traits.stroke_mm * (CLOSED_COUNT - OPEN_COUNT));
     const long current = std::lround(std::abs(motion_.effort()) * FULL_CURRENT_A / AMPERE_PER_COUNT);
-    return {static_cast<std::uint16_t>((has(rACT) ? gACT : 0) | (goes ? gGTO : 0) | gsta << gSTA_SHIFT |
-                                       gobj << gOBJ_SHIFT),
-            static_cast<std::uint16_t>(fault() << 8 | (command_[1] & 0xFF)),
-            static_cast<std::uint16_t>(count << 8 | current)};
+    return {static_cast<std::uint16_t>((has(rACT) ? gACT : 0) | (goes ? gGTO : 0) | gsta << gSTA_SHIFT | gobj << gOBJ_SHIFT),
+            static_cast<std::uint16_t>(fault() << 8 | (command_[1] & 0xFF)), static_cast<std::uint16_t>(count << 8 | current)};
   }
 
   GripperMotion &motion_;

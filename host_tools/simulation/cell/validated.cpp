@@ -39,8 +39,7 @@ struct Mark {
   double x_mm, y_mm;
 };
 
-// Each sensor, and the middle of each cell of four: columns half a pitch apart, that of sensors and
-// that of cells in turn.
+// Each sensor, and the middle of each cell of four: columns half a pitch apart, that of sensors and that of cells in turn.
 std::vector<Mark> template_marks() {
   const double pitch_mm = static_cast<double>(geometry.pitch_mm);
   std::vector<Mark> sorted, marks;
@@ -72,9 +71,8 @@ const std::vector<std::string> &pad_fault_names() {
 ValidatedPad::ValidatedPad(const ValidatedOptions &options)
     : options_(options), layer_(twin::silicone(options.fault == PadFault::thin_skin ? THIN_mm : LAYER_mm)),
       table_(twin::ContactTable::load_or_build(twin::indenter(PRESS_FACE), layer_, options.cache)),
-      weight_N_(calibrating::GRAVITY_N_PER_g * options.weight_g),
-      rubber_(options.effects, SENSORS, LAYER_mm, AIR_Pa, options.seed), deaf_(SENSORS, 1.0), drift_Pa_s_(SENSORS, 0.0),
-      absent_(SENSORS, false), before_Pa_(SENSORS, 0.0), after_Pa_(SENSORS, 0.0) {
+      weight_N_(calibrating::GRAVITY_N_PER_g * options.weight_g), rubber_(options.effects, SENSORS, LAYER_mm, AIR_Pa, options.seed),
+      deaf_(SENSORS, 1.0), drift_Pa_s_(SENSORS, 0.0), absent_(SENSORS, false), before_Pa_(SENSORS, 0.0), after_Pa_(SENSORS, 0.0) {
   for (std::size_t k = 0; k < SENSORS; k++) {
     x_mm_.push_back(static_cast<double>(geometry.x_mm[k]) + rubber_.seats()[k].dx_mm);
     y_mm_.push_back(static_cast<double>(geometry.y_mm[k]) + rubber_.seats()[k].dy_mm);
@@ -113,25 +111,18 @@ void ValidatedPad::choose_fault() {
     deaf_[faulty_[0]] = 0.0;
     absent_[faulty_[0]] = options_.seed % 2 == 1;
     break;
-  case PadFault::loose_sensor:
-    faulty_ = {any()};
-    break;
-  case PadFault::tilted_skin:
-    (random.uniform(0.0, 1.0) < 0.5 ? tilt_x_ : tilt_y_) = sign * TILT_SHARE;
-    break;
+  case PadFault::loose_sensor: faulty_ = {any()}; break;
+  case PadFault::tilted_skin: (random.uniform(0.0, 1.0) < 0.5 ? tilt_x_ : tilt_y_) = sign * TILT_SHARE; break;
   case PadFault::drift:
     while (faulty_.size() < DRIFTING) {
       const std::size_t k = any();
       if (std::find(faulty_.begin(), faulty_.end(), k) == faulty_.end()) {
         faulty_.push_back(k);
-        drift_Pa_s_[k] =
-            (random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0) * random.uniform(DRIFT_MIN_Pa_min, DRIFT_MAX_Pa_min) / 60.0;
+        drift_Pa_s_[k] = (random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0) * random.uniform(DRIFT_MIN_Pa_min, DRIFT_MAX_Pa_min) / 60.0;
       }
     }
     break;
-  case PadFault::wrong_weight:
-    weight_N_ *= sign < 0.0 ? 2.0 / 3.0 : 1.5;
-    break;
+  case PadFault::wrong_weight: weight_N_ *= sign < 0.0 ? 2.0 / 3.0 : 1.5; break;
   case PadFault::swapped_wires:
     faulty_ = {any(), any()};
     while (faulty_[1] == faulty_[0]) {
@@ -141,16 +132,14 @@ void ValidatedPad::choose_fault() {
     std::swap(gains_[faulty_[0]], gains_[faulty_[1]]);
     break;
   case PadFault::none:
-  case PadFault::thin_skin:
-    break;
+  case PadFault::thin_skin: break;
   }
   std::sort(faulty_.begin(), faulty_.end());
 }
 
 // Of rubber that is thicker by this factor the response is wider by it, and lower by its square.
 double ValidatedPad::width_at(double x_mm, double y_mm) const {
-  return 1.0 + tilt_x_ * x_mm / static_cast<double>(geometry.x_mm[SENSORS - 1]) +
-         tilt_y_ * y_mm / static_cast<double>(geometry.y_mm[0]);
+  return 1.0 + tilt_x_ * x_mm / static_cast<double>(geometry.x_mm[SENSORS - 1]) + tilt_y_ * y_mm / static_cast<double>(geometry.y_mm[0]);
 }
 
 std::vector<double> ValidatedPad::base_Pa(double x_mm, double y_mm) const {
@@ -158,19 +147,16 @@ std::vector<double> ValidatedPad::base_Pa(double x_mm, double y_mm) const {
   std::vector<double> base(SENSORS);
   for (std::size_t k = 0; k < SENSORS; k++) {
     const double own = width * rubber_.seats()[k].width;
-    base[k] =
-        table_.base_pressure_Pa(weight_N_, (x_mm_[k] - x_mm) / own, (y_mm_[k] - y_mm) / own, rubber_.dip_share()) /
-        (width * width);
+    base[k] = table_.base_pressure_Pa(weight_N_, (x_mm_[k] - x_mm) / own, (y_mm_[k] - y_mm) / own, rubber_.dip_share()) / (width * width);
   }
   return base;
 }
 
-// Of a sphere on a half-space under a load that rises to this: Mindlin, "Compliance of elastic
-// bodies in contact", J. Appl. Mech. 16, 1949.
+// Of a sphere on a half-space under a load that rises to this: Mindlin, "Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949.
 double ValidatedPad::way_mm(double pull_N) const {
   const double shear_modulus_MPa = 1e-6 * layer_.youngs_modulus_Pa / (2.0 * (1.0 + layer_.poisson));
-  const double slide_mm = 3.0 * (2.0 - layer_.poisson) * FRICTION * weight_N_ /
-                          (16.0 * shear_modulus_MPa * table_.contact_radius_mm(weight_N_));
+  const double slide_mm =
+      3.0 * (2.0 - layer_.poisson) * FRICTION * weight_N_ / (16.0 * shear_modulus_MPa * table_.contact_radius_mm(weight_N_));
   return slide_mm * (1.0 - std::pow(1.0 - pull_N / (FRICTION * weight_N_), 2.0 / 3.0));
 }
 
@@ -185,8 +171,7 @@ std::vector<double> ValidatedPad::pulled_Pa(double x_mm, double y_mm, const True
                                 pull.pull_N * along_y};
   for (std::size_t k = 0; k < SENSORS; k++) {
     const double own = width * rubber_.seats()[k].width;
-    base[k] +=
-        traction_->base_pressure_Pa(load, (x_mm_[k] - at_x_mm) / own, (y_mm_[k] - at_y_mm) / own) / (width * width);
+    base[k] += traction_->base_pressure_Pa(load, (x_mm_[k] - at_x_mm) / own, (y_mm_[k] - at_y_mm) / own) / (width * width);
   }
   return base;
 }
@@ -212,12 +197,10 @@ void ValidatedPad::draw_plan() {
   const std::vector<Mark> marks = template_marks();
   for (std::size_t i = 0; i < TURNS * marks.size(); i++) {
     const Mark &mark = marks[i % marks.size()];
-    begin("press mark=" + std::to_string(i % marks.size() + 1) + " x_mm=" + text_of(mark.x_mm) +
-          " y_mm=" + text_of(mark.y_mm));
+    begin("press mark=" + std::to_string(i % marks.size() + 1) + " x_mm=" + text_of(mark.x_mm) + " y_mm=" + text_of(mark.y_mm));
     const double x = mark.x_mm + options_.hand_sd_mm * hand.normal();
     const double y = mark.y_mm + options_.hand_sd_mm * hand.normal();
-    truth_.push_back({std::cos(turn) * x - std::sin(turn) * y + shift_x,
-                      std::sin(turn) * x + std::cos(turn) * y + shift_y, weight_N_});
+    truth_.push_back({std::cos(turn) * x - std::sin(turn) * y + shift_x, std::sin(turn) * x + std::cos(turn) * y + shift_y, weight_N_});
     touch(truth_.back().x_mm, truth_.back().y_mm, PRESSES_s);
     t_s += MOVES_s;
   }

@@ -49,9 +49,7 @@ double pressure_Pa(void *context, unsigned sensor, std::uint64_t t_us) {
   return static_cast<Scenario *>(context)->pressure_Pa(sensor, t_us);
 }
 
-double temperature_degC(void *context, unsigned, std::uint64_t t_us) {
-  return static_cast<Scenario *>(context)->temperature_degC(t_us);
-}
+double temperature_degC(void *context, unsigned, std::uint64_t t_us) { return static_cast<Scenario *>(context)->temperature_degC(t_us); }
 
 /* The commands, each with a number of its own. */
 class Commands {
@@ -132,17 +130,14 @@ int calibrate(const CalibrateOptions &options) {
 int play(const PlayOptions &options) {
   // Everything that can be wrong is, before anything takes time.
   std::vector<wire_packet> wanted;
-  const auto want = [&wanted](const std::vector<WantedSetting> &settings) {
-    wanted.push_back(setting_commands(settings, {}).front());
-  };
+  const auto want = [&wanted](const std::vector<WantedSetting> &settings) { wanted.push_back(setting_commands(settings, {}).front()); };
   want({setting_from_text("osr=" + options.osr)});
   want({setting_from_text("rate=" + options.rate)});
   if (!options.slip_threshold.empty() || !options.slip_window.empty()) {
     if (options.slip_threshold.empty() || options.slip_window.empty()) {
       throw Error("--slip-threshold and --slip-window belong together; give both");
     }
-    want({setting_from_text("slip_threshold=" + options.slip_threshold),
-          setting_from_text("slip_window=" + options.slip_window)});
+    want({setting_from_text("slip_threshold=" + options.slip_threshold), setting_from_text("slip_window=" + options.slip_window)});
   }
   if ((options.prior_sigma_mm > 0.0F) != (options.prior_width_mm > 0.0F)) {
     throw Error("--prior-sigma and --prior-width belong together; give both");
@@ -151,8 +146,7 @@ int play(const PlayOptions &options) {
   if (options.pad_mm) {
     pad = pad::profile_over_own_sensors({*options.pad_mm, 0.0, options.from_touch});
   }
-  const std::vector<wire_packet> first =
-      options.first.empty() ? std::vector<wire_packet>() : commands_in(options.first);
+  const std::vector<wire_packet> first = options.first.empty() ? std::vector<wire_packet>() : commands_in(options.first);
   for (const std::string *path : {&options.recording, &options.raw_bytes, &options.commands}) {
     if (!path->empty()) {
       check_output(*path, options.replace);
@@ -212,8 +206,7 @@ int play(const PlayOptions &options) {
         throw Error(options.scenario + ": has " + std::to_string(scenario.sensors()) + " sensors; this firmware has " +
                     std::to_string(info.sensor_count));
       }
-      writer.emplace(make_lines(options.recording, options.replace, OutputFile::Appears::when_finished), &info,
-                     info.sensor_count,
+      writer.emplace(make_lines(options.recording, options.replace, OutputFile::Appears::when_finished), &info, info.sensor_count,
                      Metadata{{"recorded_by", "fingertip_player"},
                               {"simulated", "the firmware's code on simulated sensors"},
                               {"scenario", scenario.name()},
@@ -288,14 +281,9 @@ public:
         }
       }
       break;
-    case WIRE_CONTACT:
-      contact_ = packet;
-      break;
-    case WIRE_RAW:
-      frame(packet);
-      break;
-    default:
-      break;
+    case WIRE_CONTACT: contact_ = packet; break;
+    case WIRE_RAW: frame(packet); break;
+    default: break;
     }
   }
   const Repeated &result() const { return result_; }
@@ -330,9 +318,9 @@ private:
                     "frame %u: flags %08x %08x, x %.9g %.9g mm, y %.9g %.9g mm, force %.9g %.9g N, "
                     "slip %.9g %.9g mm",
                     static_cast<unsigned>(a.frame), static_cast<unsigned>(a.flags), static_cast<unsigned>(b.flags),
-                    static_cast<double>(a.x_mm), static_cast<double>(b.x_mm), static_cast<double>(a.y_mm),
-                    static_cast<double>(b.y_mm), static_cast<double>(a.force_N), static_cast<double>(b.force_N),
-                    static_cast<double>(a.slip_mm), static_cast<double>(b.slip_mm));
+                    static_cast<double>(a.x_mm), static_cast<double>(b.x_mm), static_cast<double>(a.y_mm), static_cast<double>(b.y_mm),
+                    static_cast<double>(a.force_N), static_cast<double>(b.force_N), static_cast<double>(a.slip_mm),
+                    static_cast<double>(b.slip_mm));
       result_.first_difference = text;
     }
   }
@@ -349,24 +337,21 @@ int repeat_capture(const std::string &capture) {
   feed_file(capture, decoder, [&](const wire_packet &packet) { repeater.packet(packet); });
   const Repeated &r = repeater.result();
   if (decoder.statistics().dropped_packets > 0 || decoder.statistics().crc_errors > 0) {
-    throw Error(capture + ": packets are missing (" + decoder.statistics().text() +
-                "); what follows them cannot be repeated");
+    throw Error(capture + ": packets are missing (" + decoder.statistics().text() + "); what follows them cannot be repeated");
   }
   if (repeater.lonely_frame()) {
-    throw Error("frame " + std::to_string(*repeater.lonely_frame()) +
-                " has no contact packet; stream both contact and raw");
+    throw Error("frame " + std::to_string(*repeater.lonely_frame()) + " has no contact packet; stream both contact and raw");
   }
   if (r.frames == 0) {
     throw Error(capture + (repeater.tared() ? ": no frame after the tare"
                                             : ": no tare; have one within the capture, "
                                               "before anything touches the pad"));
   }
-  std::printf("{\"frames\": %llu, \"in_contact\": %llu, \"held\": %llu, \"equal\": %llu}\n",
-              static_cast<unsigned long long>(r.frames), static_cast<unsigned long long>(r.in_contact),
-              static_cast<unsigned long long>(r.held), static_cast<unsigned long long>(r.equal));
+  std::printf("{\"frames\": %llu, \"in_contact\": %llu, \"held\": %llu, \"equal\": %llu}\n", static_cast<unsigned long long>(r.frames),
+              static_cast<unsigned long long>(r.in_contact), static_cast<unsigned long long>(r.held),
+              static_cast<unsigned long long>(r.equal));
   if (r.equal != r.frames) {
-    throw Error(capture + ": " + std::to_string(r.frames - r.equal) + " contact packets differ, the first " +
-                r.first_difference);
+    throw Error(capture + ": " + std::to_string(r.frames - r.equal) + " contact packets differ, the first " + r.first_difference);
   }
   return 0;
 }
@@ -379,8 +364,7 @@ int run(int argc, char **argv) {
     return command->add_option(name, value, help)->type_name(type);
   };
   PlayOptions given;
-  CLI::App *player =
-      app.add_subcommand("play", "Apply a scenario to simulated sensors and record the firmware's packets");
+  CLI::App *player = app.add_subcommand("play", "Apply a scenario to simulated sensors and record the firmware's packets");
   option(player, "scenario", given.scenario, "FILE.csv", "CSV file, from twin or fingertip-scenario")->required();
   option(player, "-o,--output", given.recording, "FILE.csv", "Recording, as of fingertip record")->required();
   player->add_flag("--overwrite", given.replace, "Replace a recording that exists");
@@ -389,10 +373,8 @@ int run(int argc, char **argv) {
   option(player, "--slip-threshold", given.slip_threshold, "MM", "Slip distance");
   option(player, "--slip-window", given.slip_window, "MS", "Its window");
   option(player, "--prior-sigma", given.prior_sigma_mm, "MM", "Prior on sigma")->check(CLI::Range(0.1, 100.0));
-  option(player, "--prior-width", given.prior_width_mm, "MM", "Its standard deviation")
-      ->check(CLI::Range(0.001, 100.0));
-  CLI::Option *pad =
-      option(player, "--pad", given.pad_mm, "MM", "Thickness of the pad: the firmware estimates tangential force");
+  option(player, "--prior-width", given.prior_width_mm, "MM", "Its standard deviation")->check(CLI::Range(0.001, 100.0));
+  CLI::Option *pad = option(player, "--pad", given.pad_mm, "MM", "Thickness of the pad: the firmware estimates tangential force");
   player->add_flag("--from-touch", given.from_touch, "As of fingertip pad")->needs(pad);
   option(player, "--first", given.first, "FILE", "Commands that it is sent first, of fingertip_player calibrate");
   option(player, "--noise", given.noise, "FACTOR", "Times the datasheet's; default 1")->check(CLI::Range(0.0, 1000.0));
@@ -403,28 +385,24 @@ int run(int argc, char **argv) {
       })
       ->capture_default_str();
   option(player, "--seed", given.seed, "N", "Of noise and calibration; default 1");
-  option(player, "--seconds", given.seconds, "S", "Default: to the scenario's end")
-      ->check(CLI::Range(0.1, SECONDS_MAX));
+  option(player, "--seconds", given.seconds, "S", "Default: to the scenario's end")->check(CLI::Range(0.1, SECONDS_MAX));
   player->add_flag("--raw", given.raw, "Record the pressures too");
   option(player, "--raw-bytes", given.raw_bytes, "FILE.ftr", "Keep the bytes of the line too, as of fingertip record");
   option(player, "--commands", given.commands, "FILE", "And those that it was sent, before 0 s");
   player->add_flag("--quiet", given.quiet, "No progress");
 
   CalibrateOptions calibrated;
-  CLI::App *calibrater =
-      app.add_subcommand("calibrate", "Judge a weight's placements, as fingertip calibrate does, and write the "
-                                      "commands that bring what it found: play --first");
+  CLI::App *calibrater = app.add_subcommand("calibrate", "Judge a weight's placements, as fingertip calibrate does, and write the "
+                                                         "commands that bring what it found: play --first");
   option(calibrater, "placements", calibrated.placements, "FILE.csv", "Recording of them, with --raw")->required();
   option(calibrater, "--force", calibrated.force_N, "N", "That weight, N")->required()->check(CLI::Range(0.1, 100.0));
   option(calibrater, "-o,--output", calibrated.commands, "FILE", "The commands")->required();
-  option(calibrater, "--overhang", calibrated.overhang_mm, "MM",
-         "Rubber beyond the outer sensors, as of fingertip pad");
+  option(calibrater, "--overhang", calibrated.overhang_mm, "MM", "Rubber beyond the outer sensors, as of fingertip pad");
   calibrater->add_flag("--overwrite", calibrated.replace, "Replace a file that exists");
 
   std::string capture;
-  CLI::App *repeater =
-      app.add_subcommand("repeat", "Compute the contact packets of a capture once more from its pressures, and compare "
-                                   "them byte by byte, stage times apart");
+  CLI::App *repeater = app.add_subcommand("repeat", "Compute the contact packets of a capture once more from its pressures, and compare "
+                                                    "them byte by byte, stage times apart");
   option(repeater, "capture", capture, "FILE",
          "Bytes of the line (fingertip record --raw-bytes, or the emulator's --capture) with contact and raw packets, "
          "an info packet and a tare")

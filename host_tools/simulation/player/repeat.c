@@ -14,8 +14,7 @@ static struct pad_profile pad;
 bool repeat_begin(const struct wire_info *info) {
   memset(&app, 0, sizeof app);
   const struct ms58xx_osr *osr = ms58xx_find_osr(info->osr);
-  if (!osr ||
-      fit_array_init(&app.stages.location.array, info->sensor_count, info->x_mm, info->y_mm, info->pitch_mm) != FT_OK) {
+  if (!osr || fit_array_init(&app.stages.location.array, info->sensor_count, info->x_mm, info->y_mm, info->pitch_mm) != FT_OK) {
     return false;
   }
   app.commands.streams = WIRE_STREAM_CONTACT; /* it is not read, but the packet is made */

@@ -1,5 +1,4 @@
-/* The computing part of the firmware on pressures that a fingertip has sent: what should its
- * contact packets have been? */
+/* The computing part of the firmware on pressures that a fingertip has sent: what should its contact packets have been? */
 #pragma once
 
 #include "wire/packet.h"

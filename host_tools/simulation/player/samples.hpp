@@ -1,5 +1,4 @@
-/* Pressures on sensors, and their temperature, over time: linear between rows, held before the
- * first and after the last. */
+/* Pressures on sensors, and their temperature, over time: linear between rows, held before the first and after the last. */
 #pragma once
 
 #include <cstddef>

@@ -42,9 +42,7 @@ Scenario::Scenario(const std::string &path) {
     throw Error(path + ": cannot read the scenario (" + std::strerror(errno) + "); check the path");
   }
   std::size_t line_number = 0;
-  const auto fail = [&](const std::string &what) {
-    throw Error(path + ":" + std::to_string(line_number) + ": " + what);
-  };
+  const auto fail = [&](const std::string &what) { throw Error(path + ":" + std::to_string(line_number) + ": " + what); };
   std::map<std::string, std::string> metadata;
   std::vector<std::string> header;
   std::optional<std::size_t> temperature_at;
@@ -100,14 +98,13 @@ Scenario::Scenario(const std::string &path) {
       }
       for (std::size_t i = 0; i < expected.size(); i++) {
         if (i >= header.size() || header[i] != expected[i]) {
-          fail("column " + std::to_string(i + 1) + " is \"" + (i < header.size() ? header[i] : "") + "\"; expected \"" +
-               expected[i] + "\"");
+          fail("column " + std::to_string(i + 1) + " is \"" + (i < header.size() ? header[i] : "") + "\"; expected \"" + expected[i] +
+               "\"");
         }
       }
       const auto more = header.begin() + static_cast<std::ptrdiff_t>(expected.size());
       for (auto name = more; name != header.end(); ++name) {
-        if (std::find(std::begin(OPTIONAL), std::end(OPTIONAL), *name) == std::end(OPTIONAL) ||
-            std::find(more, name, *name) != name) {
+        if (std::find(std::begin(OPTIONAL), std::end(OPTIONAL), *name) == std::end(OPTIONAL) || std::find(more, name, *name) != name) {
           fail("column " + std::to_string(name - header.begin() + 1) + " is \"" + *name +
                "\"; after the sensors there may be, once each: Qx_N, Qy_N, temperature_degC");
         }

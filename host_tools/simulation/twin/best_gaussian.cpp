@@ -76,8 +76,7 @@ BestGaussian::Fit BestGaussian::at(double force_N) const {
   const double at = std::log(within_N / FORCE_MIN_N) * (FORCES - 1) / range;
   const std::size_t i = std::min(static_cast<std::size_t>(at), std::size_t(FORCES - 2));
   const double t = at - static_cast<double>(i);
-  return {force_N * (p0_per_N_[i] + t * (p0_per_N_[i + 1] - p0_per_N_[i])),
-          sigma_mm_[i] + t * (sigma_mm_[i + 1] - sigma_mm_[i])};
+  return {force_N * (p0_per_N_[i] + t * (p0_per_N_[i + 1] - p0_per_N_[i])), sigma_mm_[i] + t * (sigma_mm_[i + 1] - sigma_mm_[i])};
 }
 
 } // namespace fingertip::twin

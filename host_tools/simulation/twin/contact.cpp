@@ -39,8 +39,8 @@ struct ContactSolver::Work {
   double yield_mm_Pa; // of one node under its own pressure
 
   Work(const Indenter &indenter, const Layer &layer, const Grid &g)
-      : grid(g), nodes2(std::size_t(g.nodes) * std::size_t(g.nodes)), transform(g.nodes), height_mm(nodes2),
-        compliance(transform.waves()), transfer(transform.waves()), pressure_Pa(nodes2, 0.0) {
+      : grid(g), nodes2(std::size_t(g.nodes) * std::size_t(g.nodes)), transform(g.nodes), height_mm(nodes2), compliance(transform.waves()),
+        transfer(transform.waves()), pressure_Pa(nodes2, 0.0) {
     for (int i = 0; i < g.nodes; i++) {
       for (int j = 0; j < g.nodes; j++) {
         height_mm[at(i, j)] = indenter.profile_mm((i - g.nodes / 2) * g.step_mm, (j - g.nodes / 2) * g.step_mm);

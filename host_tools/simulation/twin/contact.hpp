@@ -32,8 +32,7 @@ struct Contact {
   std::vector<double> base_Pa;     // the same, on the base
 };
 
-// One indenter on one layer, for forces one after the other. Each solution starts from the last.
-// Not to be shared between threads.
+// One indenter on one layer, for forces one after the other. Each solution starts from the last. Not to be shared between threads.
 class ContactSolver {
 public:
   ContactSolver(const Indenter &indenter, const Layer &layer, const Grid &grid);

@@ -20,17 +20,13 @@ public:
   static constexpr double FORCE_MIN_N = ForcePlanes::FORCE_MIN_N;
   static constexpr double FORCE_MAX_N = ForcePlanes::FORCE_MAX_N;
 
-  // From the cache if it holds this very table, else solved (half a minute at most) and kept there;
-  // a damaged file is solved again. on_progress gets the share done, 0..1. Throws
-  // std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
-  static ContactTable load_or_build(const Indenter &indenter, const Layer &layer,
-                                    const std::filesystem::path &cache_directory,
+  // From the cache if it holds this very table, else solved (half a minute at most) and kept there; a damaged file is solved again.
+  // on_progress gets the share done, 0..1. Throws std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
+  static ContactTable load_or_build(const Indenter &indenter, const Layer &layer, const std::filesystem::path &cache_directory,
                                     const std::function<void(double)> &on_progress = {});
 
   // On the base, by dx, dy from the middle of the contact, along the indenter's own axes.
-  double base_pressure_Pa(double force_N, double dx_mm, double dy_mm) const {
-    return pressure_.at(force_N, dx_mm, dy_mm);
-  }
+  double base_pressure_Pa(double force_N, double dx_mm, double dy_mm) const { return pressure_.at(force_N, dx_mm, dy_mm); }
   // Less the dip of cast rubber, effect "dip" of effects.hpp: this share of the pressure in the
   // middle times exp(-r^2 / (2 (DIP_WIDTHS s)^2)). s: of the Gaussian of that pressure and force.
   static constexpr double DIP_WIDTHS = 2.5;

@@ -32,8 +32,7 @@ constexpr double RESIDUAL_LEAST = 0.5, RESIDUAL_MOST = 1.25;
 constexpr double DIPS_LEAST = 0.75, DIPS_MOST = 2.25;
 constexpr double DIPS_SHARE = 1.0 / 3.0; // of the sensors; assumed
 constexpr double BACK_LEAST_s = 1.0, BACK_MOST_s = 4.0;
-// Coefficients C1 to C4 and C6 of the data sheet's example (MS5837-02BA, page 7) and their spread,
-// assumed as the players assume it.
+// Coefficients C1 to C4 and C6 of the data sheet's example (MS5837-02BA, page 7) and their spread, assumed as the players assume it.
 constexpr std::array<double, 5> PROM{46372.0, 43981.0, 29059.0, 27842.0, 28165.0};
 constexpr double PROM_SPREAD = 0.03;
 
@@ -49,8 +48,8 @@ const Effect &effect(const std::string &name) {
   if (const Effect *found = find_in(effects(), [&](const Effect &one) { return one.name == name; })) {
     return *found;
   }
-  throw Error("there is no effect \"" + printable(name) + "\"; give some of: " +
-              joined(effects(), ", ", [](const Effect &one) { return one.name; }) + "; or all or none");
+  throw Error("there is no effect \"" + printable(name) +
+              "\"; give some of: " + joined(effects(), ", ", [](const Effect &one) { return one.name; }) + "; or all or none");
 }
 
 // What has followed a ramp of RAMP_s to 1 with the time constant tau, after a hold of `hold_s`.
@@ -74,15 +73,13 @@ Pad::Branch branch_of(const std::array<double, PROM.size()> &c, double ambient_P
   constexpr double BELOW = -1000.0; // 10.00 degC less 20.00 degC
   constexpr double SQUARE = BELOW * BELOW;
   const double dT = BELOW * 0x1p23 / c[4];
-  // From 10 degC on 30 / 2^8 of the square is taken off the offset and nothing off the sensitivity;
-  // below 35 / 2^3 and 63 / 2^5.
+  // From 10 degC on 30 / 2^8 of the square is taken off the offset and nothing off the sensitivity; below 35 / 2^3 and 63 / 2^5.
   const double offset = c[1] * 0x1p17 + c[3] * dT * 0x1p-6 - 30.0 * SQUARE * 0x1p-8;
   const double sensitivity = c[0] * 0x1p16 + c[2] * dT * 0x1p-7;
   const double offset_step = (35.0 * 0x1p-3 - 30.0 * 0x1p-8) * SQUARE;
   const double slope = 63.0 * 0x1p-5 * SQUARE / sensitivity;
   // The temperature itself loses 14 / 2^35 of dT^2 below and 12 / 2^35 above: the middle.
-  return {0.01 * (1000.0 - 13.0 * dT * dT * 0x1p-35), slope * (ambient_Pa + offset * 0x1p-15) - offset_step * 0x1p-15,
-          slope};
+  return {0.01 * (1000.0 - 13.0 * dT * dT * 0x1p-35), slope * (ambient_Pa + offset * 0x1p-15) - offset_step * 0x1p-15, slope};
 }
 
 } // namespace
@@ -94,8 +91,7 @@ std::array<double, Pad::TIMES_s.size()> relaxation_strengths(double share) {
 
 const std::vector<Effect> &effects() {
   static const std::vector<Effect> all{
-      {"dip", "%", 5.0, 0.0, 10.0,
-       "around a contact the pressure is lower by this share of its middle, 2.5 times as wide",
+      {"dip", "%", 5.0, 0.0, 10.0, "around a contact the pressure is lower by this share of its middle, 2.5 times as wide",
        std::string(GRIDS) + ": 5 % as calibrations expect it, -1 to -2 % is left at 3.5 to 4 widths"},
       {"widths", "%", 3.5, 0.0, 20.0, "each sensor's response is wider or narrower by this sd",
        std::string(GRIDS) + ": widths of sensors' responses differ by 3 to 4 % (sd)"},
@@ -103,8 +99,7 @@ const std::vector<Effect> &effects() {
        std::string(GRIDS) + ": 0.1 to 0.23 mm from the board's drawing"},
       {"gain", "%", 10.0, 0.0, 30.0, "gain of each sensor off by a normal share of this sd",
        std::string(STRIP) + ": gains differ by +-10 %"},
-      {"drift", "Pa in 16 min", 170.0, 0.0, 5000.0,
-       "zero of each sensor wanders by this, 24 % to either side, up or down",
+      {"drift", "Pa in 16 min", 170.0, 0.0, 5000.0, "zero of each sensor wanders by this, 24 % to either side, up or down",
        std::string(STRIP) + ": 130 to 210 Pa in 16 min"},
       {"relaxation", "%", 9.0, 0.0, 40.0,
        "where travel is held the force itself falls by this share in 8 s, on a pad up to 56 % more or less of it",
@@ -115,8 +110,7 @@ const std::vector<Effect> &effects() {
        "after the hold and comes back in 1 to 4 s",
        "public recordings, read once: 0.35 % between sensors of a press on a cast pad (n = 5); " + std::string(STRIP) +
            ": 2.6 %, one in eight 10 to 15 %, and as much off after the hold"},
-      {"hysteresis", "%", 3.0, 0.0, 20.0,
-       "loop of loading and unloading at any speed, as a share of the work of loading",
+      {"hysteresis", "%", 3.0, 0.0, 20.0, "loop of loading and unloading at any speed, as a share of the work of loading",
        "2.7 to 4.2 % at 0.1 Hz in silicone pads: Romano et al., Soft Science 4:31, 2024, table 2"},
       {"aftereffect", "%", 2.0, 0.0, 20.0,
        "after a release each sensor is off by 0.5 to 1.25 times this share of its peak, one in "
@@ -127,8 +121,7 @@ const std::vector<Effect> &effects() {
        "presses next to a load cell: Shaevitzaiden/slip_detection, two of seven read: per newton a "
        "sensor rises by 0.9 to 1.7 % in a hold, and is 1.2 to 2.1 % of the peak above its zero "
        "0.5 s after it, 0.8 to 1.3 % at 1.5 s"},
-      {"temperature", "K", 6.0, -40.0, 40.0,
-       "the sensors warm up slowly by this, as in a hand; pressures are compensated",
+      {"temperature", "K", 6.0, -40.0, 40.0, "the sensors warm up slowly by this, as in a hand; pressures are compensated",
        "assumed: room at 25 degC, skin at 31; time from the diffusivity of silicone rubber, "
        "0.12 mm2/s"},
       {"branch", "degC", 5.0, -20.0, 25.0,
@@ -165,8 +158,8 @@ EffectValues parse_effects(const std::string &text) {
       const auto given = to_double(trim(part.substr(equals + 1)));
       if (!given || *given < chosen.lowest || *given > chosen.highest) {
         throw Error("effect " + name + " is \"" + printable(part.substr(equals + 1)) + "\"; give " +
-                    shortest(static_cast<float>(chosen.lowest)) + " to " +
-                    shortest(static_cast<float>(chosen.highest)) + " (" + chosen.unit + ")");
+                    shortest(static_cast<float>(chosen.lowest)) + " to " + shortest(static_cast<float>(chosen.highest)) + " (" +
+                    chosen.unit + ")");
       }
       value = *given;
     }
@@ -226,8 +219,7 @@ Pad::Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, doub
       for (std::size_t k = 0; k < sensors; k++) {
         Random random(seed, AFTEREFFECT, k);
         const bool dips = random.uniform(0.0, 1.0) < DIPS_SHARE;
-        const double times =
-            dips ? -random.uniform(DIPS_LEAST, DIPS_MOST) : random.uniform(RESIDUAL_LEAST, RESIDUAL_MOST);
+        const double times = dips ? -random.uniform(DIPS_LEAST, DIPS_MOST) : random.uniform(RESIDUAL_LEAST, RESIDUAL_MOST);
         aftereffects_.push_back({0.01 * value * times, random.log_uniform(BACK_LEAST_s, BACK_MOST_s)});
       }
     } else if (name == "branch") {

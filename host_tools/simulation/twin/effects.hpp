@@ -53,9 +53,8 @@ public:
 
   Pad(const EffectValues &effects, std::size_t sensors, double layer_mm, double ambient_Pa, std::uint64_t seed);
 
-  // The pressure that each sensor reports above ambient at this time, given the pressure on the
-  // base. Times must increase; between them the pressure on the base is linear. The first time is
-  // the beginning: the pad is at rest until then.
+  // The pressure that each sensor reports above ambient at this time, given the pressure on the base. Times must increase; between them the
+  // pressure on the base is linear. The first time is the beginning: the pad is at rest until then.
   void report(double t_s, const std::vector<double> &base_Pa, std::vector<double> &reported_Pa);
   double temperature_degC(double t_s) const;
 
@@ -92,8 +91,7 @@ private:
   struct Rubber { // of one sensor
     // Memory: after the hysteresis at the last time, what follows it, its decay over a step, its share of that.
     double elastic_Pa = 0.0, follows_Pa = 0.0, decay = 1.0, strength = 0.0;
-    // Hysteresis: the last pressure and what it lacks, whether it falls, where it turned last, and
-    // the largest since the pressure was none.
+    // Hysteresis: the last pressure and what it lacks, whether it falls, where it turned last, and the largest since the pressure was none.
     double pressure_Pa = 0.0, lacks_Pa = 0.0;
     bool falls = false;
     double turn_Pa = 0.0, turn_lacks_Pa = 0.0, largest_Pa = 0.0;

@@ -21,21 +21,17 @@ struct Between {
 
 Between between(double force_N) {
   constexpr double LOWEST_N = ForcePlanes::FORCE_MIN_N, HIGHEST_N = ForcePlanes::FORCE_MAX_N;
-  const double at = std::log(std::clamp(force_N, LOWEST_N, HIGHEST_N) / LOWEST_N) * (ForcePlanes::FORCES - 1) /
-                    std::log(HIGHEST_N / LOWEST_N);
+  const double at =
+      std::log(std::clamp(force_N, LOWEST_N, HIGHEST_N) / LOWEST_N) * (ForcePlanes::FORCES - 1) / std::log(HIGHEST_N / LOWEST_N);
   const int first = std::clamp(static_cast<int>(at) - 1, 0, ForcePlanes::FORCES - 4);
   return {first, cubic(at - first - 1)};
 }
 
-double sign(double x, ForcePlanes::Symmetry symmetry) {
-  return symmetry == ForcePlanes::Symmetry::odd && x < 0.0 ? -1.0 : 1.0;
-}
+double sign(double x, ForcePlanes::Symmetry symmetry) { return symmetry == ForcePlanes::Symmetry::odd && x < 0.0 ? -1.0 : 1.0; }
 
 } // namespace
 
-double ForcePlanes::force_at(int n) {
-  return FORCE_MIN_N * std::pow(FORCE_MAX_N / FORCE_MIN_N, double(n) / (FORCES - 1));
-}
+double ForcePlanes::force_at(int n) { return FORCE_MIN_N * std::pow(FORCE_MAX_N / FORCE_MIN_N, double(n) / (FORCES - 1)); }
 
 double ForcePlanes::node(int force, int i, int j) const {
   return static_cast<double>(values_[std::size_t((force * nodes_ + i) * nodes_ + j)]);

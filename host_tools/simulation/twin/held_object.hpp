@@ -3,14 +3,12 @@
 //   mass d2x/dt2 = load - Q
 // along one line, x from where nothing pulled, Q what the rubber holds against it.
 //
-// The contact is a bundle of elements, each a spring with a damper that ends in a slider, side by
-// side (Iwan, "On a class of models for the yielding behavior of continuous and composite systems",
-// J. Appl. Mech. 34, 1967). Springs and sliders are such that a growing load meets what Cattaneo
-// and Mindlin's contact does ("Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949),
+// The contact is a bundle of elements, each a spring with a damper that ends in a slider, side by side (Iwan, "On a class of models for the
+// yielding behavior of continuous and composite systems", J. Appl. Mech. 34, 1967). Springs and sliders are such that a growing load meets
+// what Cattaneo and Mindlin's contact does ("Compliance of elastic bodies in contact", J. Appl. Mech. 16, 1949),
 //   Q = mu F (1 - (1 - x / d)^(3/2)),  d = 1.5 mu F / stiffness
-// and so does, with both axes doubled, one that turns back, as in Mindlin and Deresiewicz' at
-// constant F (J. Appl. Mech. 20, 1953): Masing's rule. More and more of the elements slide: partial
-// slip. Where all do, x is no longer held: gross slip.
+// and so does, with both axes doubled, one that turns back, as in Mindlin and Deresiewicz' at constant F (J. Appl. Mech. 20, 1953):
+// Masing's rule. More and more of the elements slide: partial slip. Where all do, x is no longer held: gross slip.
 //
 // Friction: a slider holds its share of mu F. mu falls from the static to the kinetic one within
 // some SETTLES_mm of gross slip and grows back in some HEALS_s of rest,

@@ -23,8 +23,7 @@ static Indenter sphere(const std::string &name, double d, const std::string &des
   return {name, description, Indenter::Shape::sphere, d, d, d, 0.0, E};
 }
 
-static Indenter flat(Indenter::Shape shape, const std::string &name, double size, double edge,
-                     const std::string &description) {
+static Indenter flat(Indenter::Shape shape, const std::string &name, double size, double edge, const std::string &description) {
   return {name, description, shape, size, size, 0.0, edge, 0.0};
 }
 
@@ -35,8 +34,7 @@ static std::vector<Indenter> make() {
       sphere("sphere15", 15, "large spherical indenter, 15 mm"),
       flat(Shape::flat_cylinder, "cylinder6", 6, EDGE_mm, "cylindrical indenter, flat end of 6 mm"),
       flat(Shape::flat_square, "cube6", 6, EDGE_mm, "cubical indenter, flat side of 6 mm"),
-      {"ball_bearing", "ball bearing held by its outer ring: steel roller, 22 mm by 7 mm", Shape::roller, 22, 7, 0,
-       EDGE_mm, 0},
+      {"ball_bearing", "ball bearing held by its outer ring: steel roller, 22 mm by 7 mm", Shape::roller, 22, 7, 0, EDGE_mm, 0},
       flat(Shape::flat_cylinder, "bottle_cap", 28, 1.5, "bottle cap held by its top: flat disc, 28 mm"),
       {"lime", "lime: ellipsoid 45 by 55 mm, as stiff as its rind, 1 MPa", Shape::ellipsoid, 45, 55, 45, 0, 1e6},
       {"finger", "finger: ellipsoid 16 by 20 mm of 0.15 MPa; assumed", Shape::ellipsoid, 16, 20, 16, 0, 0.15e6},
@@ -46,8 +44,8 @@ static std::vector<Indenter> make() {
   for (int size : {12, 18, 24}) {
     const std::string mm = std::to_string(size);
     all.push_back(sphere("sphere" + mm, size, "sphere of " + mm + " mm"));
-    all.push_back({"cylinder" + mm, "cylinder of " + mm + " mm on its side, as long as it is thick", Shape::roller,
-                   double(size), double(size), 0, EDGE_mm, 0});
+    all.push_back({"cylinder" + mm, "cylinder of " + mm + " mm on its side, as long as it is thick", Shape::roller, double(size),
+                   double(size), 0, EDGE_mm, 0});
     all.push_back(flat(Shape::flat_square, "cube" + mm, size, EDGE_mm, "cube of " + mm + " mm"));
   }
   return all;
@@ -62,12 +60,9 @@ double Indenter::profile_mm(double x_mm, double y_mm) const {
     const double share = x * x / (a * a) + y * y / (b * b);
     return share < 1.0 ? c * (1.0 - std::sqrt(1.0 - share)) : NOTHING_mm;
   }
-  case Shape::flat_cylinder:
-    return rounding(std::hypot(x, y) - (a - edge_mm), edge_mm);
-  case Shape::flat_square:
-    return rounding(std::max(x, y) - (a - edge_mm), edge_mm);
-  case Shape::roller:
-    return (x < a ? a - std::sqrt(a * a - x * x) : NOTHING_mm) + rounding(y - (b - edge_mm), edge_mm);
+  case Shape::flat_cylinder: return rounding(std::hypot(x, y) - (a - edge_mm), edge_mm);
+  case Shape::flat_square: return rounding(std::max(x, y) - (a - edge_mm), edge_mm);
+  case Shape::roller: return (x < a ? a - std::sqrt(a * a - x * x) : NOTHING_mm) + rounding(y - (b - edge_mm), edge_mm);
   }
   return NOTHING_mm;
 }

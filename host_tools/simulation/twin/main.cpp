@@ -63,16 +63,15 @@ void show(ProgressBar &bar, double share) {
 
 Layer layer_of(double thickness_mm) {
   if (!(thickness_mm >= LAYER_MIN_mm && thickness_mm <= LAYER_MAX_mm)) {
-    throw Error("--layer " + number(thickness_mm) + " is out of range; give " + number(LAYER_MIN_mm) + " to " +
-                number(LAYER_MAX_mm) + " mm");
+    throw Error("--layer " + number(thickness_mm) + " is out of range; give " + number(LAYER_MIN_mm) + " to " + number(LAYER_MAX_mm) +
+                " mm");
   }
   return silicone(thickness_mm);
 }
 
 // There and open to new tables, which take long to solve.
 std::filesystem::path cache_of(const Options &options) {
-  const std::filesystem::path cache =
-      options.cache.empty() ? default_cache_directory() : std::filesystem::path(options.cache);
+  const std::filesystem::path cache = options.cache.empty() ? default_cache_directory() : std::filesystem::path(options.cache);
   std::error_code error;
   std::filesystem::create_directories(cache, error);
   if (error || !std::filesystem::is_directory(cache) || access(cache.c_str(), W_OK | X_OK) != 0) {
@@ -84,8 +83,8 @@ std::filesystem::path cache_of(const Options &options) {
 int list() {
   std::printf("Scenarios (twin scenario KIND), usual length and force:\n");
   for (const ScenarioKind &kind : scenario_kinds()) {
-    std::printf("  %-14s%s; %s s, %s N\n", kind.name.c_str(), kind.description.c_str(),
-                number(kind.usual_seconds).c_str(), kind.usual_forces.c_str());
+    std::printf("  %-14s%s; %s s, %s N\n", kind.name.c_str(), kind.description.c_str(), number(kind.usual_seconds).c_str(),
+                kind.usual_forces.c_str());
   }
   std::printf("\nIndenters (--indenter):\n");
   for (const Indenter &one : indenters()) {
@@ -157,8 +156,8 @@ int width(const Options &options) {
   const BestGaussian gaussian(table_of(name, layer, options), layer.thickness_mm);
   const BestGaussian::Fit fit = gaussian.at(options.width_force_N);
   const double force_N = 2e-6 * M_PI * fit.p0_Pa * fit.sigma_mm * fit.sigma_mm;
-  std::printf("sigma_mm=%s force_share=%s peak_kPa=%s\n", fixed(fit.sigma_mm, 3).c_str(),
-              fixed(force_N / options.width_force_N, 3).c_str(), fixed(1e-3 * fit.p0_Pa, 2).c_str());
+  std::printf("sigma_mm=%s force_share=%s peak_kPa=%s\n", fixed(fit.sigma_mm, 3).c_str(), fixed(force_N / options.width_force_N, 3).c_str(),
+              fixed(1e-3 * fit.p0_Pa, 2).c_str());
   return 0;
 }
 
@@ -191,8 +190,8 @@ int scenario(Options &options) {
     written = write_scenario(made, layer, table, block ? &*block : nullptr, options.output, options.overwrite,
                              [&](double share) { show(bar, share); });
   }
-  std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n", printable(options.output).c_str(),
-              made.name.c_str(), made.episodes.size(), number(*made.options.seconds).c_str(), written.rows,
+  std::printf("%s: %s, %zu contacts in %s s, %zu rows, %s MB, at most %s kPa\n", printable(options.output).c_str(), made.name.c_str(),
+              made.episodes.size(), number(*made.options.seconds).c_str(), written.rows,
               fixed(1e-6 * static_cast<double>(written.bytes), 1).c_str(), fixed(1e-3 * written.peak_Pa, 1).c_str());
   return 0;
 }
@@ -223,8 +222,7 @@ int run(int argc, char **argv) {
     return command->add_option(name, value, help)->type_name(type);
   };
   const auto with_cache = [&](CLI::App *command) {
-    option(command, "--cache", options.cache, "DIR",
-           "Folder of the contact tables; default: ~/.cache/fingertip/contact-tables");
+    option(command, "--cache", options.cache, "DIR", "Folder of the contact tables; default: ~/.cache/fingertip/contact-tables");
   };
 
   app.add_subcommand("list", "Explain scenarios, indenters, layers and effects")->callback([&] { action = list; });
@@ -240,8 +238,7 @@ int run(int argc, char **argv) {
 
   ScenarioOptions &s = options.scenario;
   const auto with_contact = [&](CLI::App *command) {
-    option(command, "--indenter", s.indenter, "NAME",
-           "Contact shape; default sphere6, for placements and drags sphere15");
+    option(command, "--indenter", s.indenter, "NAME", "Contact shape; default sphere6, for placements and drags sphere15");
     option(command, "--layer", s.layer_mm, "MM", "Thickness of the rubber; default 12");
   };
 
@@ -251,8 +248,7 @@ int run(int argc, char **argv) {
   option(fit, "--force", options.width_force_N, "N", "Normal force")
       ->check(CLI::Range(ContactTable::FORCE_MIN_N, ContactTable::FORCE_MAX_N))
       ->capture_default_str();
-  option(fit, "--shore", options.shore_a, "A", "Hardness of the rubber, Shore A; default 15")
-      ->check(CLI::Range(SHORE_MIN, SHORE_MAX));
+  option(fit, "--shore", options.shore_a, "A", "Hardness of the rubber, Shore A; default 15")->check(CLI::Range(SHORE_MIN, SHORE_MAX));
   with_cache(fit);
   fit->callback([&] { action = [&] { return width(options); }; });
 
@@ -262,8 +258,7 @@ int run(int argc, char **argv) {
   with_contact(write);
   option(write, "--overhang", s.overhang_mm, "MM", "The pad ends so far beyond its outer sensors; default: never");
   option(write, "--gain", options.gain, "PERCENT", "Short for the effect gain; 0: none");
-  option(write, "--effects", options.effects, "NAME[=VALUE],...",
-         "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all");
+  option(write, "--effects", options.effects, "NAME[=VALUE],...", "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all");
   const auto seed = [&](const char *name, auto &value, const char *help) {
     const auto set = [&value, name](const std::string &text) { value = seed_from_text(name, text); };
     write->add_option_function<std::string>(name, set, help)->type_name("N");
@@ -275,19 +270,14 @@ int run(int argc, char **argv) {
   option(write, "--tangential", s.tangential, "SHARE[,DEG]",
          "Pulled along the rubber by this share of the force, as 0.3 or any of 0.1..0.4; without an angle in any "
          "direction. In lifts the weight, in drags what hangs on the string, default 0.3; else 0");
-  option(write, "--friction", s.friction, "MU",
-         "Holds what is pulled, as 0.5 or any of 0.3..0.8; default 0.5, in slides 0.3..0.8");
+  option(write, "--friction", s.friction, "MU", "Holds what is pulled, as 0.5 or any of 0.3..0.8; default 0.5, in slides 0.3..0.8");
   option(write, "--kinetic", s.kinetic_share, "SHARE", "Kinetic friction per static, in slides; 0.8");
   option(write, "--mass", s.mass_kg, "KG", "Of the object, in slides; default 0.1..0.5");
-  option(write, "--speed", s.speeds_mm_s, "MM_PER_S,...", "In turn, of slip, rolloff, drag, the hand in slides")
-      ->delimiter(',');
-  option(write, "--dead-travel", s.dead_travel_mm, "MM",
-         "Way of the pusher, or of the pulled object, before it slips; default 1");
-  option(write, "--creep", s.creep_share, "SHARE",
-         "Share of the dead travel by which the contact moves along; default 0.5");
+  option(write, "--speed", s.speeds_mm_s, "MM_PER_S,...", "In turn, of slip, rolloff, drag, the hand in slides")->delimiter(',');
+  option(write, "--dead-travel", s.dead_travel_mm, "MM", "Way of the pusher, or of the pulled object, before it slips; default 1");
+  option(write, "--creep", s.creep_share, "SHARE", "Share of the dead travel by which the contact moves along; default 0.5");
   option(write, "--stick-slip", s.stick_slip_mm, "MM", "Slip in jumps of this size; default 0: steady");
-  option(write, "--margin", s.margin_mm, "MM",
-         "Random places reach so far beyond the paper's grid; default 2.25, for placements 4.5");
+  option(write, "--margin", s.margin_mm, "MM", "Random places reach so far beyond the paper's grid; default 2.25, for placements 4.5");
   option(write, "--quiet", s.quiet_s, "S", "Time between contacts; default 1.2");
   write->add_flag("--overwrite", options.overwrite, "Replace files that exist");
   with_cache(write);

@@ -157,9 +157,7 @@ public:
     return 1.5 * USUAL_FRICTION * USUAL_N / stage_.options.dead_travel_mm * stage_.table.contact_radius_mm(force_N) /
            stage_.table.contact_radius_mm(USUAL_N);
   }
-  double dead_travel_mm(double force_N, double friction) const {
-    return 1.5 * friction * force_N / stiffness_N_mm(force_N);
-  }
+  double dead_travel_mm(double force_N, double friction) const { return 1.5 * friction * force_N / stiffness_N_mm(force_N); }
 
 private:
   const Stage &stage_;
@@ -191,30 +189,25 @@ Course run(const Script &script, const Stage &stage) {
     const double stiffness_N_mm = rubber.stiffness_N_mm(grip_N.at(MS_s * ms));
     for (int i = 0; i < steps; i++) {
       const double t_s = MS_s * ms + HeldObject::STEP_s * i;
-      const double hand_mm_s =
-          (script.hand_mm.at(t_s + HeldObject::STEP_s) - script.hand_mm.at(t_s)) / HeldObject::STEP_s;
-      const double string_N =
-          t_s < script.hand_begin_s
-              ? 0.0
-              : std::max(0.0, STRING_N_mm * (script.hand_mm.at(t_s) + straight_mm - object.way_mm()) +
-                                  damping_N_s_mm * (hand_mm_s - object.speed_mm_s()));
-      object.step(HeldObject::STEP_s, grip_N.at(t_s), stiffness_N_mm,
-                  lowered.at(t_s - over_s) * (script.weight_N.at(t_s) + string_N));
+      const double hand_mm_s = (script.hand_mm.at(t_s + HeldObject::STEP_s) - script.hand_mm.at(t_s)) / HeldObject::STEP_s;
+      const double string_N = t_s < script.hand_begin_s
+                                  ? 0.0
+                                  : std::max(0.0, STRING_N_mm * (script.hand_mm.at(t_s) + straight_mm - object.way_mm()) +
+                                                      damping_N_s_mm * (hand_mm_s - object.speed_mm_s()));
+      object.step(HeldObject::STEP_s, grip_N.at(t_s), stiffness_N_mm, lowered.at(t_s - over_s) * (script.weight_N.at(t_s) + string_N));
     }
     const double t_s = MS_s * (ms + 1), force_N = grip_N.at(t_s);
     const double holds_N = object.friction() * force_N;
     // Friction and force have gone on since the last step began.
-    const double pull_N = object.slips() ? std::copysign(holds_N, object.tangential_N())
-                                         : std::clamp(object.tangential_N(), -holds_N, holds_N);
+    const double pull_N =
+        object.slips() ? std::copysign(holds_N, object.tangential_N()) : std::clamp(object.tangential_N(), -holds_N, holds_N);
     course.force_N.push_back(force_N);
     course.way_mm.push_back(object.way_mm());
     course.pull_N.push_back(pull_N);
     course.friction.push_back(object.friction());
     // Once half of the normal force's contact slides, and until three quarters of it stick.
     const bool partly = !course.phases.empty() && course.phases.back() != STICKS;
-    course.phases.push_back(object.slips()                                        ? SLIPS
-                            : std::abs(pull_N) >= (partly ? 0.25 : 0.5) * holds_N ? PARTLY_SLIPS
-                                                                                  : STICKS);
+    course.phases.push_back(object.slips() ? SLIPS : std::abs(pull_N) >= (partly ? 0.25 : 0.5) * holds_N ? PARTLY_SLIPS : STICKS);
     course.farthest_mm = std::max(course.farthest_mm, std::abs(object.way_mm()));
     if (object.slips()) {
       course.fastest_mm_s = std::max(course.fastest_mm_s, std::abs(object.speed_mm_s()));
@@ -223,8 +216,7 @@ Course run(const Script &script, const Stage &stage) {
         slip_mm = object.way_mm();
       }
     }
-    if (!noticed && (t_s - slip_s >= script.notice_s || std::abs(object.way_mm() - slip_mm) >= script.notice_mm) &&
-        t_s >= slip_s) {
+    if (!noticed && (t_s - slip_s >= script.notice_s || std::abs(object.way_mm() - slip_mm) >= script.notice_mm) && t_s >= slip_s) {
       noticed = true;
       grip_N = Profile(force_N);
       grip_N.hold(t_s).ease(GRIPS_s, script.caught_N);
@@ -364,8 +356,7 @@ Episode slide(const Stage &stage, std::size_t n) {
   return episode;
 }
 
-// A gripped object is turned about the grasp's axis, to either side: rubber winds up until friction
-// gives way, then the object spins.
+// A gripped object is turned about the grasp's axis, to either side: rubber winds up until friction gives way, then the object spins.
 Episode screw(const Stage &stage, std::size_t n) {
   constexpr double TORQUE_RISES_s = 0.4; // from none to what friction holds
   constexpr double LOADS_s = 0.3;
@@ -407,8 +398,7 @@ Episode screw(const Stage &stage, std::size_t n) {
     std::vector<double> angles_rad;
     for (int i = 1; i <= steps; i++) {
       const double change = (to - from) * i / steps;
-      angles_rad.push_back(angle_rad +
-                           side * turns * wind_up_rad(change / turns, chosen.friction * force_N, shear_MPa, radius_mm));
+      angles_rad.push_back(angle_rad + side * turns * wind_up_rad(change / turns, chosen.friction * force_N, shear_MPa, radius_mm));
     }
     track.angle_rad.trace(angles_rad, 1e-5);
     phase(episode, name, track.angle_rad.end_s());

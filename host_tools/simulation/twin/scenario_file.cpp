@@ -168,8 +168,7 @@ private:
     }
     channels_.clear();
     for (const auto &[value, tolerance] : values_of(row)) {
-      channels_.push_back(
-          {value, tolerance, -std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
+      channels_.push_back({value, tolerance, -std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()});
     }
     anchor_ = true;
     anchor_s_ = row.t_s;
@@ -193,9 +192,7 @@ private:
   std::size_t rows_ = 0, bytes_ = 0;
 };
 
-void metadata(Text &text, const std::string &key, const std::string &value) {
-  text << "# " << key << ": " << value << "\n";
-}
+void metadata(Text &text, const std::string &key, const std::string &value) { text << "# " << key << ": " << value << "\n"; }
 
 std::string number(double value) { return shortest(static_cast<float>(value)); }
 
@@ -209,13 +206,10 @@ std::string list(const std::vector<double> &values, double factor, int digits) {
 
 std::string file_name(const std::string &path) { return std::filesystem::path(path).filename().string(); }
 
-bool moves_under_load(const std::string &kind) {
-  return kind == "lift" || kind == "drag" || kind == "slide" || kind == "screw";
-}
+bool moves_under_load(const std::string &kind) { return kind == "lift" || kind == "drag" || kind == "slide" || kind == "screw"; }
 
 // What is drawn for each sensor of an effect that has a share and a time.
-template <typename Own>
-void describe_own(Text &text, const char *shares, const char *times, const std::vector<Own> &sensors) {
+template <typename Own> void describe_own(Text &text, const char *shares, const char *times, const std::vector<Own> &sensors) {
   if (sensors.empty()) {
     return;
   }
@@ -296,8 +290,7 @@ void describe(Text &text, const Scenario &scenario, const Layer &layer, const Pa
     metadata(text, "branch_steps_Pa", list(steps_Pa, 1.0, 2));
   }
   metadata(text, "gaussian",
-           scenario.options.kind == "two" ? "none: p0_Pa and sigma_mm are 0"
-                                          : "p0_Pa and sigma_mm: closest to the pressure on the base");
+           scenario.options.kind == "two" ? "none: p0_Pa and sigma_mm are 0" : "p0_Pa and sigma_mm: closest to the pressure on the base");
   metadata(text, "truth", file_name(truth_path(path)));
 }
 
@@ -358,11 +351,10 @@ std::string truth_of(const Scenario &scenario, const std::string &path) {
 void check_inside(const Block &block, const Touch &contact, const Track &track, double radius_mm) {
   const bool rolls = std::isfinite(track.edge_x_mm);
   const double room_mm = rolls ? 0.0 : radius_mm;
-  if (contact.force_N > 0.0 &&
-      (std::abs(contact.x_mm) + room_mm > block.half_x_mm || std::abs(contact.y_mm) + room_mm > block.half_y_mm)) {
-    throw Error("a contact of " + fixed(radius_mm, 1) + " mm radius at " + fixed(contact.x_mm, 1) + ", " +
-                fixed(contact.y_mm, 1) + " mm leaves the pad, which ends at " + fixed(block.half_x_mm, 1) + ", " +
-                fixed(block.half_y_mm, 1) + " mm; give a larger --overhang, a smaller --margin or less --force");
+  if (contact.force_N > 0.0 && (std::abs(contact.x_mm) + room_mm > block.half_x_mm || std::abs(contact.y_mm) + room_mm > block.half_y_mm)) {
+    throw Error("a contact of " + fixed(radius_mm, 1) + " mm radius at " + fixed(contact.x_mm, 1) + ", " + fixed(contact.y_mm, 1) +
+                " mm leaves the pad, which ends at " + fixed(block.half_x_mm, 1) + ", " + fixed(block.half_y_mm, 1) +
+                " mm; give a larger --overhang, a smaller --margin or less --force");
   }
 }
 
@@ -456,12 +448,11 @@ Written write_scenario(const Scenario &scenario, const Layer &layer, const Conta
             const double along_x = cosine * dx + sine * dy, along_y = cosine * dy - sine * dx;
             base_Pa[k] += table.base_pressure_Pa(contact.force_N, along_x, along_y, pad.dip_share());
             if (block) {
-              base_Pa[k] += block->added_Pa(k, {contact.force_N, contact.pull_x_N, contact.pull_y_N, radius_mm},
-                                            contact.x_mm, contact.y_mm);
+              base_Pa[k] +=
+                  block->added_Pa(k, {contact.force_N, contact.pull_x_N, contact.pull_y_N, radius_mm}, contact.x_mm, contact.y_mm);
             }
             if (scenario.pulls) {
-              const TractionTable::Load load{contact.force_N, contact.stuck_N,
-                                             cosine * contact.pull_x_N + sine * contact.pull_y_N,
+              const TractionTable::Load load{contact.force_N, contact.stuck_N, cosine * contact.pull_x_N + sine * contact.pull_y_N,
                                              cosine * contact.pull_y_N - sine * contact.pull_x_N};
               base_Pa[k] += traction->base_pressure_Pa(load, along_x, along_y);
             }

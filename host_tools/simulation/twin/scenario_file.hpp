@@ -58,7 +58,6 @@ struct Written {
 // Both files, whole or not at all. `block` is null for a layer without end. Throws Error, also if a contact leaves the
 // block, but by rolling off.
 Written write_scenario(const Scenario &scenario, const Layer &layer, const ContactTable &table, const BlockTable *block,
-                       const std::string &path, bool replace,
-                       const std::function<void(double share)> &on_progress = {});
+                       const std::string &path, bool replace, const std::function<void(double share)> &on_progress = {});
 
 } // namespace fingertip::twin

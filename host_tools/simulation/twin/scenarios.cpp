@@ -56,8 +56,8 @@ static Episode grid(const Stage &stage, std::size_t n) {
   Random strength(stage.options.seed, GRID, n);
   // Forces in turn: after some passes every place has had all of them in every way.
   const std::size_t turn = static_cast<std::size_t>(at) + pass + 2 * way;
-  Episode episode = press(ways[way].name, {GRID_STEP_mm * column, GRID_STEP_mm * row},
-                          stage.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[way].ramp_s, ways[way].hold_s);
+  Episode episode = press(ways[way].name, {GRID_STEP_mm * column, GRID_STEP_mm * row}, stage.forces.pick(turn, strength.uniform(0.0, 1.0)),
+                          ways[way].ramp_s, ways[way].hold_s);
   episode.sensors_near = (column % 2 != 0 ? 2 : 1) * (row % 2 != 0 ? 2 : 1);
   return episode;
 }
@@ -237,8 +237,7 @@ constexpr const char *USUAL_MASS_kg = "0.1..0.5"; // assumed
 
 static void check(const char *option, double value, double lowest, double highest) {
   if (!(value >= lowest && value <= highest)) {
-    throw Error(std::string(option) + " " + number(value) + " is out of range; give " + number(lowest) + " to " +
-                number(highest));
+    throw Error(std::string(option) + " " + number(value) + " is out of range; give " + number(lowest) + " to " + number(highest));
   }
 }
 
@@ -249,9 +248,8 @@ static void check_slide(const ScenarioOptions &options, double friction) {
   }
   const double grip_N = slide_force_N(mass_kg.highest, friction, options.kinetic_share);
   if (grip_N > ContactTable::FORCE_MAX_N) {
-    throw Error("--mass " + number(mass_kg.highest) + " needs a grip of up to " + number(grip_N) + " N at --friction " +
-                number(friction) + ", above " + number(ContactTable::FORCE_MAX_N) +
-                "; give less mass or more friction");
+    throw Error("--mass " + number(mass_kg.highest) + " needs a grip of up to " + number(grip_N) + " N at --friction " + number(friction) +
+                ", above " + number(ContactTable::FORCE_MAX_N) + "; give less mass or more friction");
   }
 }
 
@@ -291,17 +289,16 @@ const std::vector<ScenarioKind> &scenario_kinds() {
       {"slip", 120, "6", "a gripped object is pushed 24 mm along y at 20, 50, 100, 150, 200 mm/s", slip},
       {"twist", 60, "6", "a gripped object turns by 90 degrees about its contact", twist},
       {"rolloff", 60, "6", "an object rolls over the pad's edge at 10, 25, 50 mm/s", rolloff},
-      {"placements", 150, "3", "one weight set down at random places for 2 s each, to calibrate from", placement,
-       "sphere15", GRID_STEP_mm}, // to the outer sensors
-      {"lift", 120, "6", "a gripped object's weight, 0.3 of the grip's force, is taken over in 0.1, 0.3 and 1 s", lift,
-       "sphere6", 0.5 * GRID_STEP_mm, "0.3", "0.5", true},
-      {"drag", 120, "3", "a weight on the pad is pulled along by a string: by 0.3 of it, then by what slides", drag,
-       "sphere15", 0.5 * GRID_STEP_mm, "0.3", "0.5", true},
-      {"slide", 240, "6",
-       "a gripped object of 0.1 to 0.5 kg slips where friction gives way: pulled, too heavy, let loose, or carried",
+      {"placements", 150, "3", "one weight set down at random places for 2 s each, to calibrate from", placement, "sphere15",
+       GRID_STEP_mm}, // to the outer sensors
+      {"lift", 120, "6", "a gripped object's weight, 0.3 of the grip's force, is taken over in 0.1, 0.3 and 1 s", lift, "sphere6",
+       0.5 * GRID_STEP_mm, "0.3", "0.5", true},
+      {"drag", 120, "3", "a weight on the pad is pulled along by a string: by 0.3 of it, then by what slides", drag, "sphere15",
+       0.5 * GRID_STEP_mm, "0.3", "0.5", true},
+      {"slide", 240, "6", "a gripped object of 0.1 to 0.5 kg slips where friction gives way: pulled, too heavy, let loose, or carried",
        slide, "sphere6", 0.5 * GRID_STEP_mm, "0", "0.3..0.8", true},
-      {"screw", 60, "6", "a gripped object is turned by a torque until it spins, to either side", screw, "sphere6",
-       0.5 * GRID_STEP_mm, "0", "0.5", true},
+      {"screw", 60, "6", "a gripped object is turned by a torque until it spins, to either side", screw, "sphere6", 0.5 * GRID_STEP_mm, "0",
+       "0.5", true},
       {"two", 60, "4..10", "two contacts at once, 6 to 30 mm apart", two},
   };
   return all;
@@ -331,9 +328,8 @@ Forces::Forces(const std::string &text) {
     values_.push_back(force_N.value_or(0.0));
   }
   if (!good || (range_ && values_[1] < values_[0])) {
-    throw Error("--force \"" + printable(text) + "\" is not possible; give newtons from " +
-                number(ContactTable::FORCE_MIN_N) + " to " + number(ContactTable::FORCE_MAX_N) +
-                ": 5, or in turn 1,2,5, or any of 1..15");
+    throw Error("--force \"" + printable(text) + "\" is not possible; give newtons from " + number(ContactTable::FORCE_MIN_N) + " to " +
+                number(ContactTable::FORCE_MAX_N) + ": 5, or in turn 1,2,5, or any of 1..15");
   }
 }
 
@@ -357,8 +353,7 @@ Tangential::Tangential(const std::string &text) : share("--tangential", text.sub
   if (comma != std::string::npos) {
     angle_deg = to_double(trim(std::string_view(text).substr(comma + 1)));
     if (!angle_deg || !(std::abs(*angle_deg) <= 360.0)) {
-      throw Error("--tangential \"" + printable(text) +
-                  "\" has no direction; after the comma give degrees from -360 to 360, as 0.3,90");
+      throw Error("--tangential \"" + printable(text) + "\" has no direction; after the comma give degrees from -360 to 360, as 0.3,90");
     }
   }
 }
@@ -368,8 +363,8 @@ bool Episode::slips(double t_s) const {
   bool slips = false;
   for (std::size_t i = 0; i < phases.size(); i++) {
     const bool goes_on = i + 1 < phases.size() && phases[i + 1].slip;
-    slips = slips || (phases[i].slip && t_s > phases[i].begin_s + ROUNDING_s &&
-                      t_s < phases[i].end_s + (goes_on ? ROUNDING_s : -ROUNDING_s));
+    slips =
+        slips || (phases[i].slip && t_s > phases[i].begin_s + ROUNDING_s && t_s < phases[i].end_s + (goes_on ? ROUNDING_s : -ROUNDING_s));
   }
   return slips;
 }
@@ -412,8 +407,7 @@ ScenarioOptions complete(const ScenarioOptions &options) {
     return std::find(names.begin(), names.end(), chosen.kind) != names.end();
   };
   const auto no_effect = [&](const char *option, const char *others) {
-    throw Error(std::string(option) + " has no effect in a scenario of \"" + chosen.kind +
-                "\"; leave it out, or choose " + others);
+    throw Error(std::string(option) + " has no effect in a scenario of \"" + chosen.kind + "\"; leave it out, or choose " + others);
   };
   if (!chosen.speeds_mm_s.empty() && !is({"slip", "rolloff", "drag", "slide"})) {
     no_effect("--speed", "slip, rolloff, drag or slide");
@@ -434,8 +428,8 @@ ScenarioOptions complete(const ScenarioOptions &options) {
     no_effect("--tangential", "another");
   }
   if (!(share.lowest >= 0.0 && share.highest <= friction.lowest)) {
-    throw Error("--tangential " + number(share.lowest < 0.0 ? share.lowest : share.highest) +
-                " does not hold; give 0 to " + number(friction.lowest) + ", or another --friction");
+    throw Error("--tangential " + number(share.lowest < 0.0 ? share.lowest : share.highest) + " does not hold; give 0 to " +
+                number(friction.lowest) + ", or another --friction");
   }
   if (is({"slide"})) {
     check("--dead-travel", chosen.dead_travel_mm, 0.1, 4.0);
@@ -463,8 +457,8 @@ Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table
     }
   }
   if (stage.episodes.empty()) {
-    throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" + chosen.kind +
-                "\"; leave it out for " + number(kind.usual_seconds));
+    throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" + chosen.kind + "\"; leave it out for " +
+                number(kind.usual_seconds));
   }
   scenario.episodes = std::move(stage.episodes);
   scenario.name = name_of(chosen);

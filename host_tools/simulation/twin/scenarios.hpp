@@ -1,6 +1,5 @@
-// Scenarios: what happens to a pad over time, each composed from a kind, an indenter, a layer and
-// the errors of a pad. kinds() lists the kinds; De Clercq et al., RA-L 2022 ("the paper"), section
-// IV, is what they follow. scenario_file.hpp writes them down.
+// Scenarios: what happens to a pad over time, each composed from a kind, an indenter, a layer and the errors of a pad. kinds() lists the
+// kinds; De Clercq et al., RA-L 2022 ("the paper"), section IV, is what they follow. scenario_file.hpp writes them down.
 //
 // Nothing touches the pad for the first START_QUIET_s, nor for quiet_s after each contact: time for the 16 frames of
 // the firmware's tare at 20 frames a second; the paper, too, sets its readings to zero between contacts.

@@ -4,8 +4,7 @@
 
 namespace fingertip::twin {
 
-double traction_pressure_Pa(const ForcePlanes &along_x, const ForcePlanes &along_y, const TractionLoad &load,
-                            double dx_mm, double dy_mm) {
+double traction_pressure_Pa(const ForcePlanes &along_x, const ForcePlanes &along_y, const TractionLoad &load, double dx_mm, double dy_mm) {
   const double carried_N = load.force_N - load.stuck_N;
   if (!(carried_N > 0.0)) {
     return 0.0;

@@ -1,5 +1,4 @@
-// A tangential force on a contact, and its pressure on the base (traction_table.hpp), given the
-// planes of a sliding contact.
+// A tangential force on a contact, and its pressure on the base (traction_table.hpp), given the planes of a sliding contact.
 #pragma once
 
 #include "simulation/twin/force_planes.hpp"
@@ -18,9 +17,7 @@ inline double stuck_force_N(double force_N, double tangential_N, double friction
   return std::max(0.0, force_N - tangential_N / friction);
 }
 
-// The pressure at dx, dy from the middle of the contact, along the same axes. along_x, along_y: under a traction
-// p along that axis, Pa.
-double traction_pressure_Pa(const ForcePlanes &along_x, const ForcePlanes &along_y, const TractionLoad &load,
-                            double dx_mm, double dy_mm);
+// The pressure at dx, dy from the middle of the contact, along the same axes. along_x, along_y: under a traction p along that axis, Pa.
+double traction_pressure_Pa(const ForcePlanes &along_x, const ForcePlanes &along_y, const TractionLoad &load, double dx_mm, double dy_mm);
 
 } // namespace fingertip::twin

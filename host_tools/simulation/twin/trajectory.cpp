@@ -86,13 +86,12 @@ double Profile::at(double t_s) const {
   if (t_s <= 0.0) {
     return pieces_.front().from;
   }
-  const auto piece = std::upper_bound(pieces_.begin(), pieces_.end(), t_s,
-                                      [](double t, const Piece &candidate) { return t < candidate.end_s; });
+  const auto piece =
+      std::upper_bound(pieces_.begin(), pieces_.end(), t_s, [](double t, const Piece &candidate) { return t < candidate.end_s; });
   const double length = piece->end_s - piece->begin_s;
   const double u = (t_s - piece->begin_s) / length;
   const double step = piece->to - piece->from;
-  return piece->from + step * smooth_step(u) +
-         length * u * (1.0 - u) * (piece->rate_from * (1.0 - u) - piece->rate_to * u);
+  return piece->from + step * smooth_step(u) + length * u * (1.0 - u) * (piece->rate_from * (1.0 - u) - piece->rate_to * u);
 }
 
 double Grip::way_mm(double pusher_mm) const {
@@ -133,8 +132,7 @@ Touch Track::at(double t_s) const {
   const double load_N = pull.load_N.at(t_s);
   if (load_N != 0.0) {
     contact.stuck_N = stuck_force_N(contact.force_N, std::abs(load_N), pull.friction.at(t_s));
-    const double moved =
-        std::copysign(pull.travel_mm, load_N) * (1.0 - std::pow(contact.stuck_N / contact.force_N, 2.0 / 3.0));
+    const double moved = std::copysign(pull.travel_mm, load_N) * (1.0 - std::pow(contact.stuck_N / contact.force_N, 2.0 / 3.0));
     contact.x_mm += pull.along_x * moved;
     contact.y_mm += pull.along_y * moved;
   }

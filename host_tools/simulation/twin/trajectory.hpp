@@ -10,8 +10,7 @@
 
 namespace fingertip::twin {
 
-// A value over time, put together from cubic pieces; continuous. Times are whole milliseconds, so
-// that rows fall on the joints.
+// A value over time, put together from cubic pieces; continuous. Times are whole milliseconds, so that rows fall on the joints.
 class Profile {
 public:
   explicit Profile(double value = 0.0) : value_(value) {}
@@ -45,10 +44,9 @@ private:
 // What a held object does on the pad while something pushes it: the way of the contact, given that
 // of the pusher. Both in mm, 0 at rest; the way never falls.
 //
-// At first the object is held, and the pusher's way goes into the rubber and all else that gives: the dead travel
-// (README.md has its amount and sources). The part of it at the base creeps along as 1 - (1 - s / dead travel)^(3/2)
-// (Mindlin, J. Appl. Mech. 16, 1949). In stick-slip the object rests for 4/5 of each period of the pusher's way and
-// catches up in the last fifth.
+// At first the object is held, and the pusher's way goes into the rubber and all else that gives: the dead travel (README.md has its amount
+// and sources). The part of it at the base creeps along as 1 - (1 - s / dead travel)^(3/2) (Mindlin, J. Appl. Mech. 16, 1949). In
+// stick-slip the object rests for 4/5 of each period of the pusher's way and catches up in the last fifth.
 struct Grip {
   double dead_travel_mm = 0.0;
   double creep_share = 0.5;   // of the dead travel
@@ -59,11 +57,10 @@ struct Grip {
   double pusher_mm(double way_mm) const;
 };
 
-// The tangential force of an object on the rubber, along one direction: a share of the normal force
-// that rises and falls with it, as in an oblique push, or a load that comes while the normal force
-// stays, as a weight does. Under a load the object and its contact move along: by travel_mm when
-// all slides and by 1 - (1 - Q / (friction F))^(2/3) of it before (Mindlin, as in Grip), and back
-// the same way. Where a HeldObject moves, its way is the pusher's, and travel_mm is 0.
+// The tangential force of an object on the rubber, along one direction: a share of the normal force that rises and falls with it, as in an
+// oblique push, or a load that comes while the normal force stays, as a weight does. Under a load the object and its contact move along: by
+// travel_mm when all slides and by 1 - (1 - Q / (friction F))^(2/3) of it before (Mindlin, as in Grip), and back the same way. Where a
+// HeldObject moves, its way is the pusher's, and travel_mm is 0.
 struct Pull {
   double along_x = 1.0, along_y = 0.0; // unit vector
   double share = 0.0;

@@ -45,8 +45,7 @@ Transform::~Transform() {
 
 std::size_t Transform::waves() const { return std::size_t(nodes_) * std::size_t(nodes_ / 2 + 1); }
 
-template <typename Response>
-const double *Transform::apply_any(const std::vector<double> &field, const Response &response) {
+template <typename Response> const double *Transform::apply_any(const std::vector<double> &field, const Response &response) {
   std::copy(field.begin(), field.end(), plans_->real);
   fftw_execute(plans_->forward);
   for (std::size_t n = 0; n < waves(); n++) {
@@ -56,9 +55,7 @@ const double *Transform::apply_any(const std::vector<double> &field, const Respo
   return plans_->real;
 }
 
-const double *Transform::apply(const std::vector<double> &field, const std::vector<double> &response) {
-  return apply_any(field, response);
-}
+const double *Transform::apply(const std::vector<double> &field, const std::vector<double> &response) { return apply_any(field, response); }
 
 const double *Transform::apply(const std::vector<double> &field, const std::vector<std::complex<double>> &response) {
   return apply_any(field, response);

@@ -15,14 +15,12 @@ using namespace fingertip::calibrating;
 using namespace fingertip::measure;
 
 MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(solved), FIELD(helps), FIELD(has_own), FIELD(width_mm),
-               FIELD(residual_share), FIELD(sigma_sd_mm), FIELD(dip), FIELD(dip_sd), FIELD(position_mm),
-               FIELD(halves_shape), FIELD(halves_gauge), FIELD(force_scale), FIELD(force_scale_sd),
-               FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(dip_share), FIELD(dip_sd_mm), FIELD(worst_shape_sd),
-               FIELD(gauge_sd), FIELD(force_share), FIELD(ellipse), FIELD(offset_share), FIELD(drift_share),
-               FIELD(slope), FIELD(kept_share), FIELD(wanted_x_mm), FIELD(wanted_y_mm))
+               FIELD(residual_share), FIELD(sigma_sd_mm), FIELD(dip), FIELD(dip_sd), FIELD(position_mm), FIELD(halves_shape),
+               FIELD(halves_gauge), FIELD(force_scale), FIELD(force_scale_sd), FIELD(prior_sigma_mm), FIELD(prior_width_mm),
+               FIELD(dip_share), FIELD(dip_sd_mm), FIELD(worst_shape_sd), FIELD(gauge_sd), FIELD(force_share), FIELD(ellipse),
+               FIELD(offset_share), FIELD(drift_share), FIELD(slope), FIELD(kept_share), FIELD(wanted_x_mm), FIELD(wanted_y_mm))
 
-MEASURE_RECORD(calibrated_sensor, FIELD(gain), FIELD(gain_sd), FIELD(reading_sd), FIELD(off_x_mm), FIELD(off_y_mm),
-               FIELD(wider))
+MEASURE_RECORD(calibrated_sensor, FIELD(gain), FIELD(gain_sd), FIELD(reading_sd), FIELD(off_x_mm), FIELD(off_y_mm), FIELD(wider))
 
 static calibration found_by(const Judgement &judgement, const Shape &shape) {
   const Solution &solution = judgement.solution;
@@ -54,9 +52,8 @@ static calibration found_by(const Judgement &judgement, const Shape &shape) {
   return found;
 }
 
-void fingertip::measure::describe(const Array &layout, const std::vector<Placement> &placements,
-                                  const Judgement &judgement, double force_N, calibration &found,
-                                  calibrated_sensor *sensors, fit_own *own) {
+void fingertip::measure::describe(const Array &layout, const std::vector<Placement> &placements, const Judgement &judgement, double force_N,
+                                  calibration &found, calibrated_sensor *sensors, fit_own *own) {
   const Solution &solution = judgement.kept;
   const Shape shape = shape_of(solution);
   found = found_by(judgement, shape);
@@ -71,24 +68,21 @@ void fingertip::measure::describe(const Array &layout, const std::vector<Placeme
   for (std::size_t k = 0; k < layout.sensors(); k++) {
     const auto at = [&](const std::vector<double> &values) { return k < values.size() ? values[k] : 0.0; };
     const Own sensor = k < shape.own.size() ? shape.own[k] : Own{};
-    sensors[k] = {at(solution.gain), at(solution.gain_sd), at(solution.reading_sd),
-                  sensor.off_x_mm,   sensor.off_y_mm,      sensor.wider};
+    sensors[k] = {at(solution.gain), at(solution.gain_sd), at(solution.reading_sd), sensor.off_x_mm, sensor.off_y_mm, sensor.wider};
   }
 }
 
 // Sessions [session][placement][sensor]; a sensor whose reading is not a number has none. last: no placement follows.
 // force_N: of each placement. fading: share of the readings that each loses in half a second, or none. own
 // [session][sensor]: zeros unless the session found it.
-static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm, double noise_Pa,
-                      double force_N, std::int64_t last, Batch<const double, 2> t_s, Batch<const double, 3> reading_Pa,
-                      Batch<const double, 2> fading, Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors,
-                      Batch<fit_own, 2> own) {
+static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm, double noise_Pa, double force_N,
+                      std::int64_t last, Batch<const double, 2> t_s, Batch<const double, 3> reading_Pa, Batch<const double, 2> fading,
+                      Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors, Batch<fit_own, 2> own) {
   same_length(x_mm, y_mm);
   same_length(found, t_s, reading_Pa, sensors, own);
   require(fading.size() == 0 || (fading.size() == found.size() && fading.size(1) == t_s.size(1)), "other fadings");
   const std::size_t count = x_mm.size(), placements_of_each = reading_Pa.size(1);
-  require(reading_Pa.size(2) == count && sensors.size(1) == count && own.size(1) == count &&
-              t_s.size(1) == placements_of_each,
+  require(reading_Pa.size(2) == count && sensors.size(1) == count && own.size(1) == count && t_s.size(1) == placements_of_each,
           "arrays of another number of sensors or placements");
   Array layout;
   layout.pitch_mm = pitch_mm;

@@ -29,9 +29,7 @@ void failed(const char *entry, const char *what) { last_failure = entry + std::s
 
 extern "C" {
 
-__attribute__((visibility("default"))) const char *measure_failure() {
-  return fingertip::measure::last_failure.c_str();
-}
+__attribute__((visibility("default"))) const char *measure_failure() { return fingertip::measure::last_failure.c_str(); }
 
 // A line for each: name, bytes, and name:offset:kind:bytes:count of each field.
 __attribute__((visibility("default"))) const char *measure_records() {
@@ -40,8 +38,8 @@ __attribute__((visibility("default"))) const char *measure_records() {
     for (const auto &record : fingertip::measure::records()) {
       all += record.name + " " + std::to_string(record.bytes);
       for (const auto &field : record.fields) {
-        all += " " + field.name + ":" + std::to_string(field.offset) + ":" + field.kind + ":" +
-               std::to_string(field.item_bytes) + ":" + std::to_string(field.count);
+        all += " " + field.name + ":" + std::to_string(field.offset) + ":" + field.kind + ":" + std::to_string(field.item_bytes) + ":" +
+               std::to_string(field.count);
       }
       all += "\n";
     }

@@ -44,9 +44,7 @@ template <class Item, int DIMENSIONS> struct Batch {
   Item *data;
   std::array<std::int64_t, DIMENSIONS> shape;
 
-  std::size_t size(int dimension = 0) const {
-    return static_cast<std::size_t>(shape[static_cast<std::size_t>(dimension)]);
-  }
+  std::size_t size(int dimension = 0) const { return static_cast<std::size_t>(shape[static_cast<std::size_t>(dimension)]); }
   // What an index of the first dimension holds: an item, or the first item of a row.
   std::size_t stride() const {
     std::size_t items = 1;
@@ -180,15 +178,14 @@ int call(const char *entry, const measure_argument *arguments, std::int64_t coun
 
 } // namespace fingertip::measure
 
-#define MEASURE_ENTRY(name)                                                                                            \
-  extern "C" __attribute__((visibility("default"))) int measure_##name(const measure_argument *arguments,              \
-                                                                       std::int64_t count) {                           \
-    return fingertip::measure::call(#name, arguments, count, &name);                                                   \
+#define MEASURE_ENTRY(name)                                                                                                                \
+  extern "C" __attribute__((visibility("default"))) int measure_##name(const measure_argument *arguments, std::int64_t count) {            \
+    return fingertip::measure::call(#name, arguments, count, &name);                                                                       \
   }
 
-#define MEASURE_RECORD(type, ...)                                                                                      \
-  [[maybe_unused]] static const bool type##_is_listed = [] {                                                           \
-    using Struct = type;                                                                                               \
-    return fingertip::measure::list_record({#type, sizeof(Struct), {__VA_ARGS__}});                                    \
+#define MEASURE_RECORD(type, ...)                                                                                                          \
+  [[maybe_unused]] static const bool type##_is_listed = [] {                                                                               \
+    using Struct = type;                                                                                                                   \
+    return fingertip::measure::list_record({#type, sizeof(Struct), {__VA_ARGS__}});                                                        \
   }();
 #define FIELD(member) fingertip::measure::field<decltype(Struct::member)>(#member, offsetof(Struct, member))

@@ -15,12 +15,12 @@ using fingertip::twin::in_parallel;
 
 MEASURE_RECORD(fit_array, FIELD(sensor_count), FIELD(pitch_mm), FIELD(x), FIELD(y))
 MEASURE_RECORD(fit_own, FIELD(off_x_q15), FIELD(off_y_q15), FIELD(wider_q15))
-MEASURE_RECORD(fit_settings, FIELD(iterations), FIELD(noise_Pa_q10), FIELD(prior_sigma_mm), FIELD(prior_width_mm),
-               FIELD(cut_noises), FIELD(dip_share), FIELD(dip_sd_mm), FIELD(gain_sd_q16), FIELD(past_sd_Pa_q10),
-               FIELD(model_sd_q16), FIELD(location_sd_limit_mm))
-MEASURE_RECORD(fit_result, FIELD(x_mm), FIELD(y_mm), FIELD(p0_Pa), FIELD(sigma_mm), FIELD(force_N),
-               FIELD(residual_rms_Pa), FIELD(location_sd_mm), FIELD(location_noise_mm), FIELD(force_sd_N),
-               FIELD(sigma_x_mm), FIELD(sigma_y_mm), FIELD(width_correlation), FIELD(used), FIELD(flags))
+MEASURE_RECORD(fit_settings, FIELD(iterations), FIELD(noise_Pa_q10), FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(cut_noises),
+               FIELD(dip_share), FIELD(dip_sd_mm), FIELD(gain_sd_q16), FIELD(past_sd_Pa_q10), FIELD(model_sd_q16),
+               FIELD(location_sd_limit_mm))
+MEASURE_RECORD(fit_result, FIELD(x_mm), FIELD(y_mm), FIELD(p0_Pa), FIELD(sigma_mm), FIELD(force_N), FIELD(residual_rms_Pa),
+               FIELD(location_sd_mm), FIELD(location_noise_mm), FIELD(force_sd_N), FIELD(sigma_x_mm), FIELD(sigma_y_mm),
+               FIELD(width_correlation), FIELD(used), FIELD(flags))
 
 // The layout that the firmware is built for.
 static void own_layout(Batch<float, 1> x_mm, Batch<float, 1> y_mm, Batch<float, 1> pitch_mm) {
@@ -31,11 +31,9 @@ static void own_layout(Batch<float, 1> x_mm, Batch<float, 1> y_mm, Batch<float, 
 }
 MEASURE_ENTRY(own_layout)
 
-static void array_of(Batch<const float, 1> x_mm, Batch<const float, 1> y_mm, double pitch_mm,
-                     Batch<fit_array, 1> array) {
+static void array_of(Batch<const float, 1> x_mm, Batch<const float, 1> y_mm, double pitch_mm, Batch<fit_array, 1> array) {
   same_length(x_mm, y_mm);
-  require(fit_array_init(array.data, static_cast<std::uint8_t>(x_mm.size()), x_mm.data, y_mm.data,
-                         static_cast<float>(pitch_mm)) == FT_OK,
+  require(fit_array_init(array.data, static_cast<std::uint8_t>(x_mm.size()), x_mm.data, y_mm.data, static_cast<float>(pitch_mm)) == FT_OK,
           "the fit takes no such layout");
 }
 MEASURE_ENTRY(array_of)
@@ -65,8 +63,7 @@ static Kernel kernel_named(const std::string &name) {
               fit_result *result) { fit_grid(array, pressure_Pa_q10, settings, result); };
   }
   if (name == "masked") {
-    return [](const fit_array *array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
-              const fit_settings *settings,
+    return [](const fit_array *array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable, const fit_settings *settings,
               fit_result *result) { fit_grid_masked(array, pressure_Pa_q10, usable, settings, result); };
   }
   if (name == "general") {
@@ -77,9 +74,8 @@ static Kernel kernel_named(const std::string &name) {
 
 // kernel: "grid", "masked", "general", "fit" (fit_gaussian) or "fit_grid" (fit_gaussian_grid). us: of one fit, if a
 // single thread runs them.
-static void fit(std::string kernel, std::int64_t threads, Batch<const fit_array, 1> arrays,
-                Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
-                Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const std::uint32_t, 1> usable,
+static void fit(std::string kernel, std::int64_t threads, Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
+                Batch<const fit_own, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const std::uint32_t, 1> usable,
                 Batch<fit_result, 1> results, Batch<double, 1> us) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(1), own);
   same_length(results, pressure_Pa_q10, usable);
@@ -99,9 +95,8 @@ MEASURE_ENTRY(fit)
 
 // Fit of held presses [press][frame][sensor]: that of the last frame, with what the search for a tangential force that
 // is not estimated has found in the frames before. A single frame is not searched.
-static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
-                     Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10,
-                     Batch<const std::uint32_t, 1> usable, Batch<fit_result, 1> results) {
+static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
+                     Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const std::uint32_t, 1> usable, Batch<fit_result, 1> results) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   same_length(results, pressure_Pa_q10, usable);
   length_or_one(results, all_settings);

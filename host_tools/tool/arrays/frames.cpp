@@ -20,14 +20,11 @@ extern "C" {
 using namespace fingertip::measure;
 using fingertip::twin::in_parallel;
 
-MEASURE_RECORD(frame, FIELD(number), FIELD(t_us), FIELD(held), FIELD(sensor_count), FIELD(noise_Pa_q10),
-               FIELD(temperature_cC), FIELD(renewed), FIELD(restored), FIELD(valid), FIELD(doubtful), FIELD(unsettled),
-               FIELD(saturated), FIELD(pressure_Pa_q10))
-MEASURE_RECORD(conditioned, FIELD(usable), FIELD(tared), FIELD(contact), FIELD(zero_doubtful), FIELD(peak_Pa_q10),
-               FIELD(pressure_Pa_q10))
+MEASURE_RECORD(frame, FIELD(number), FIELD(t_us), FIELD(held), FIELD(sensor_count), FIELD(noise_Pa_q10), FIELD(temperature_cC),
+               FIELD(renewed), FIELD(restored), FIELD(valid), FIELD(doubtful), FIELD(unsettled), FIELD(saturated), FIELD(pressure_Pa_q10))
+MEASURE_RECORD(conditioned, FIELD(usable), FIELD(tared), FIELD(contact), FIELD(zero_doubtful), FIELD(peak_Pa_q10), FIELD(pressure_Pa_q10))
 MEASURE_RECORD(condition_gains, FIELD(inverse_q16))
-MEASURE_RECORD(contact_settings, FIELD(slip_threshold_mm), FIELD(slip_window_us), FIELD(force_scale),
-               FIELD(force_scale_sd))
+MEASURE_RECORD(contact_settings, FIELD(slip_threshold_mm), FIELD(slip_window_us), FIELD(force_scale), FIELD(force_scale_sd))
 MEASURE_RECORD(contact_result, FIELD(flags), FIELD(slip_mm))
 
 // Of this build, as the headers of these names have them.
@@ -38,9 +35,8 @@ struct firmware_constants {
   double gate_open_Pa, gate_open_noises, gate_close_Pa, gate_close_noises; // of the largest reading
 };
 MEASURE_RECORD(firmware_constants, FIELD(sensor_max_pressure_Pa), FIELD(default_gain_sd), FIELD(default_model_sd),
-               FIELD(location_sd_limit_mm), FIELD(zero_tare_frames), FIELD(default_fit_iterations),
-               FIELD(tangential_frames), FIELD(shapes_frames), FIELD(gate_open_Pa), FIELD(gate_open_noises),
-               FIELD(gate_close_Pa), FIELD(gate_close_noises))
+               FIELD(location_sd_limit_mm), FIELD(zero_tare_frames), FIELD(default_fit_iterations), FIELD(tangential_frames),
+               FIELD(shapes_frames), FIELD(gate_open_Pa), FIELD(gate_open_noises), FIELD(gate_close_Pa), FIELD(gate_close_noises))
 
 static void constants_of_build(Batch<firmware_constants, 1> constants) {
   constants[0] = {static_cast<double>(MS58XX_MAX_PRESSURE_Pa),
@@ -67,10 +63,10 @@ MEASURE_ENTRY(default_contact_settings)
 
 // frames [run][frame] through condition, fit and contact, as the firmware's main loop does it. Every run begins after
 // the frames `before`; the noise is that of each frame. gains: one, or none for sensors that are alike.
-static void chain(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
-                  Batch<const fit_own, 2> own, Batch<const contact_settings, 1> contacts,
-                  Batch<const condition_gains, 1> gains, Batch<const frame, 1> before, Batch<const frame, 2> frames,
-                  Batch<conditioned, 2> readings, Batch<fit_result, 2> fits, Batch<contact_result, 2> results) {
+static void chain(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
+                  Batch<const contact_settings, 1> contacts, Batch<const condition_gains, 1> gains, Batch<const frame, 1> before,
+                  Batch<const frame, 2> frames, Batch<conditioned, 2> readings, Batch<fit_result, 2> fits,
+                  Batch<contact_result, 2> results) {
   const fit_array *const array = &checked(arrays, arrays[0].sensor_count, own);
   same_length(frames, readings, fits, results);
   length_or_one(frames, all_settings, contacts);
@@ -113,21 +109,18 @@ static void chain(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1>
 }
 MEASURE_ENTRY(chain)
 
-MEASURE_RECORD(pad_profile, FIELD(thickness_mm), FIELD(overhang_mm), FIELD(normal), FIELD(tangential),
-               FIELD(spread_mm2), FIELD(spread_sd_mm2), FIELD(force_ratio), FIELD(tangential_scale),
-               FIELD(tangential_scale_sd), FIELD(from_touch))
+MEASURE_RECORD(pad_profile, FIELD(thickness_mm), FIELD(overhang_mm), FIELD(normal), FIELD(tangential), FIELD(spread_mm2),
+               FIELD(spread_sd_mm2), FIELD(force_ratio), FIELD(tangential_scale), FIELD(tangential_scale_sd), FIELD(from_touch))
 MEASURE_RECORD(fit_pad)
-MEASURE_RECORD(fit_tangential, FIELD(valid), FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm), FIELD(location_noise_mm),
-               FIELD(force_N), FIELD(force_sd_N), FIELD(qx_N), FIELD(qy_N), FIELD(q_sd_N), FIELD(moved_q20_mm),
-               FIELD(place_per_pull), FIELD(elongated))
+MEASURE_RECORD(fit_tangential, FIELD(valid), FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm), FIELD(location_noise_mm), FIELD(force_N),
+               FIELD(force_sd_N), FIELD(qx_N), FIELD(qy_N), FIELD(q_sd_N), FIELD(moved_q20_mm), FIELD(place_per_pull), FIELD(elongated))
 MEASURE_RECORD(fit_shapes_pad)
-MEASURE_RECORD(fit_shapes_result, FIELD(shape), FIELD(x_mm), FIELD(y_mm), FIELD(force_N), FIELD(location_sd_mm),
-               FIELD(force_sd_N), FIELD(length_mm), FIELD(along_x), FIELD(along_y), FIELD(angle_sd_rad), FIELD(qx_N),
-               FIELD(qy_N), FIELD(chi_square))
+MEASURE_RECORD(fit_shapes_result, FIELD(shape), FIELD(x_mm), FIELD(y_mm), FIELD(force_N), FIELD(location_sd_mm), FIELD(force_sd_N),
+               FIELD(length_mm), FIELD(along_x), FIELD(along_y), FIELD(angle_sd_rad), FIELD(qx_N), FIELD(qy_N), FIELD(chi_square))
 
 // Of a pad over these sensors; overhang 0: not set.
-static void profile_of(Batch<const float, 1> x_mm, Batch<const float, 1> y_mm, double pitch_mm, double thickness_mm,
-                       double overhang_mm, Batch<pad_profile, 1> profile) {
+static void profile_of(Batch<const float, 1> x_mm, Batch<const float, 1> y_mm, double pitch_mm, double thickness_mm, double overhang_mm,
+                       Batch<pad_profile, 1> profile) {
   same_length(x_mm, y_mm);
   require(x_mm.size() <= FT_MAX_SENSORS, "too many sensors");
   wire_info places{};
@@ -139,31 +132,26 @@ static void profile_of(Batch<const float, 1> x_mm, Batch<const float, 1> y_mm, d
 }
 MEASURE_ENTRY(profile_of)
 
-static void tangential_pad(Batch<const fit_array, 1> array, Batch<const pad_profile, 1> profile,
-                           Batch<fit_pad, 1> pad) {
+static void tangential_pad(Batch<const fit_array, 1> array, Batch<const pad_profile, 1> profile, Batch<fit_pad, 1> pad) {
   require(fit_pad_init(pad.data, array.data, profile.data) == FT_OK, "the firmware refuses the pad's profile");
 }
 MEASURE_ENTRY(tangential_pad)
 
-static void shapes_pad(Batch<const fit_array, 1> array, Batch<const pad_profile, 1> profile,
-                       Batch<fit_shapes_pad, 1> pad) {
+static void shapes_pad(Batch<const fit_array, 1> array, Batch<const pad_profile, 1> profile, Batch<fit_shapes_pad, 1> pad) {
   require(fit_shapes_init(pad.data, array.data, profile.data) == FT_OK, "the firmware refuses the pad's profile");
 }
 MEASURE_ENTRY(shapes_pad)
 
-// Fit and tangential estimate of contacts [contact][frame][sensor], each from its first frame on; saturated: bitmap of
-// the sensors that are left out, usable of those that are not missing. Frames whose fit is not worthwhile have
-// no estimate, and the one after begins again.
-static void tangential(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1> pads,
-                       Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
-                       Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const std::uint32_t, 2> usable,
-                       Batch<const std::uint32_t, 2> saturated, Batch<fit_result, 2> fits,
-                       Batch<fit_tangential, 2> results) {
+// Fit and tangential estimate of contacts [contact][frame][sensor], each from its first frame on; saturated: bitmap of the sensors that are
+// left out, usable of those that are not missing. Frames whose fit is not worthwhile have no estimate, and the one after begins again.
+static void tangential(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1> pads, Batch<const fit_settings, 1> all_settings,
+                       Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const std::uint32_t, 2> usable,
+                       Batch<const std::uint32_t, 2> saturated, Batch<fit_result, 2> fits, Batch<fit_tangential, 2> results) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   same_length(results, fits, pressure_Pa_q10, usable, saturated);
   length_or_one(results, all_settings, pads);
-  require(results.size(1) == pressure_Pa_q10.size(1) && results.size(1) == fits.size(1) &&
-              results.size(1) == usable.size(1) && results.size(1) == saturated.size(1),
+  require(results.size(1) == pressure_Pa_q10.size(1) && results.size(1) == fits.size(1) && results.size(1) == usable.size(1) &&
+              results.size(1) == saturated.size(1),
           "other numbers of frames");
   in_parallel(results.size(), [&](std::size_t contact) {
     const fit_settings settings = settings_of(all_settings, own, contact);

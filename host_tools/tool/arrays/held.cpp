@@ -1,5 +1,4 @@
-// What the firmware publishes of contacts over frames: the tangential force, shapes of contacts that are held, and
-// motion.
+// What the firmware publishes of contacts over frames: the tangential force, shapes of contacts that are held, and motion.
 #include "libfingertip/in_parallel.hpp"
 #include "tool/arrays/fit_arguments.hpp"
 
@@ -17,21 +16,18 @@ extern "C" {
 using namespace fingertip::measure;
 using fingertip::twin::in_parallel;
 
-// In the scales of a calibration: the corrected location and force where the estimate is valid, otherwise the
-// Gaussian's.
+// In the scales of a calibration: the corrected location and force where the estimate is valid, otherwise the Gaussian's.
 struct published {
   bool valid, elongated; // the latter as the Gaussian fit flags it
   double x_mm, y_mm, location_sd_mm, force_N;
   double qx, qy, q_sd; // per normal force
   double gaussian_x_mm, gaussian_y_mm, gaussian_force_N;
 };
-MEASURE_RECORD(published, FIELD(valid), FIELD(elongated), FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm),
-               FIELD(force_N), FIELD(qx), FIELD(qy), FIELD(q_sd), FIELD(gaussian_x_mm), FIELD(gaussian_y_mm),
-               FIELD(gaussian_force_N))
+MEASURE_RECORD(published, FIELD(valid), FIELD(elongated), FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm), FIELD(force_N), FIELD(qx),
+               FIELD(qy), FIELD(q_sd), FIELD(gaussian_x_mm), FIELD(gaussian_y_mm), FIELD(gaussian_force_N))
 
 // force_scale: 0 of a pad that is not calibrated. Scales are exact.
-static published published_of(const pad_profile &profile, double force_scale, const fit_result &fit,
-                              const fit_tangential &estimate) {
+static published published_of(const pad_profile &profile, double force_scale, const fit_result &fit, const fit_tangential &estimate) {
   contact_settings scales{};
   const double scale = force_scale > 0.0 ? force_scale : 1.0;
   scales.force_scale = static_cast<float>(scale);
@@ -71,9 +67,8 @@ static published published_of(const pad_profile &profile, double force_scale, co
 }
 
 // All zeros where there is no fit.
-static void publish(Batch<const pad_profile, 1> profile, Batch<const double, 1> force_scale,
-                    Batch<const fit_result, 1> fits, Batch<const fit_tangential, 1> estimates,
-                    Batch<published, 1> found) {
+static void publish(Batch<const pad_profile, 1> profile, Batch<const double, 1> force_scale, Batch<const fit_result, 1> fits,
+                    Batch<const fit_tangential, 1> estimates, Batch<published, 1> found) {
   same_length(found, force_scale, fits, estimates);
   for (std::size_t i = 0; i < found.size(); i++) {
     const bool has_fit = (fits[i].flags & CONTACT_FLAG_FIT_VALID) != 0;
@@ -83,8 +78,8 @@ static void publish(Batch<const pad_profile, 1> profile, Batch<const double, 1> 
 MEASURE_ENTRY(publish)
 
 // The force that the firmware reports of fits whose largest readings are these, and its standard deviation.
-static void weigh(double force_scale, double force_scale_sd, Batch<const fit_result, 1> fits,
-                  Batch<const double, 1> largest_Pa, Batch<double, 2> found) {
+static void weigh(double force_scale, double force_scale_sd, Batch<const fit_result, 1> fits, Batch<const double, 1> largest_Pa,
+                  Batch<double, 2> found) {
   same_length(found, fits, largest_Pa);
   contact_settings scales{};
   scales.force_scale = static_cast<float>(force_scale);
@@ -101,9 +96,8 @@ MEASURE_RECORD(shapes_place, FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm))
 
 // The shapes, as scene grasp has them, of contacts [contact][frame][sensor] that are held: after FIT_SHAPES_FRAMES
 // frames the first answer, and the last. Where the tangential force is estimated, its location is used.
-static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes_pad, 1> pad,
-                        Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
-                        Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const published, 1> estimates,
+static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes_pad, 1> pad, Batch<const fit_settings, 1> all_settings,
+                        Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const published, 1> estimates,
                         Batch<fit_shapes_result, 2> results, Batch<shapes_place, 2> places) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
@@ -134,8 +128,7 @@ static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes
         fit_shapes_result &result = results.row(contact)[last ? 1 : 0];
         result = job->result;
         result.shape = job->report.shape; // which stays, while what is none of these begins again
-        places.row(contact)[last ? 1 : 0] =
-            shapes_locate(&job->report, &question.fit, estimate.valid ? &load : nullptr);
+        places.row(contact)[last ? 1 : 0] = shapes_locate(&job->report, &question.fit, estimate.valid ? &load : nullptr);
       }
     }
   });
@@ -144,16 +137,14 @@ MEASURE_ENTRY(held_shapes)
 
 // Flags of the frames of contacts that come and go, with the firmware's detectors of motion. Run i has the frames
 // before end[i]; pressed: the gate is open.
-static void motion_flags(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1> pad,
-                         Batch<const fit_settings, 1> all_settings, Batch<const std::int64_t, 1> end,
-                         Batch<const std::int64_t, 1> t_us, Batch<const std::int32_t, 2> pressure_Pa_q10,
+static void motion_flags(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1> pad, Batch<const fit_settings, 1> all_settings,
+                         Batch<const std::int64_t, 1> end, Batch<const std::int64_t, 1> t_us, Batch<const std::int32_t, 2> pressure_Pa_q10,
                          Batch<const bool, 1> pressed, Batch<std::uint32_t, 1> flags) {
   same_length(flags, t_us, pressure_Pa_q10, pressed);
   length_or_one(end, all_settings);
   require(end.size() == 0 || end[end.size() - 1] == pressure_Pa_q10.shape[0], "runs of another number of frames");
   const std::uint32_t usable = (1u << pressure_Pa_q10.size(1)) - 1u;
-  const contact_settings contact{DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u, DEFAULT_FORCE_SCALE,
-                                 DEFAULT_FORCE_SCALE_SD};
+  const contact_settings contact{DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u, DEFAULT_FORCE_SCALE, DEFAULT_FORCE_SCALE_SD};
   tangential_settings published{};
   published.force_scale = published.tangential_scale = 1.0F;
   published.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;

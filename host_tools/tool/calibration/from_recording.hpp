@@ -54,8 +54,7 @@ inline Recorded<GainSession> gain_session_from(const std::string &path, const st
         }
       });
   if (!pressures) {
-    throw Error(printable(path) +
-                ": has no pressures to calibrate from; record with a firmware that sends them (fingertip info: raw)");
+    throw Error(printable(path) + ": has no pressures to calibrate from; record with a firmware that sends them (fingertip info: raw)");
   }
   return std::move(*recorded);
 }

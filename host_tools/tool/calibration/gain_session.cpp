@@ -49,8 +49,7 @@ Array array_of(const wire_info &info) {
   array.pitch_mm = std::numeric_limits<double>::infinity();
   for (std::size_t a = 0; a < array.sensors(); a++) {
     for (std::size_t b = 0; b < a; b++) {
-      array.pitch_mm =
-          std::min(array.pitch_mm, std::hypot(array.x_mm[a] - array.x_mm[b], array.y_mm[a] - array.y_mm[b]));
+      array.pitch_mm = std::min(array.pitch_mm, std::hypot(array.x_mm[a] - array.x_mm[b], array.y_mm[a] - array.y_mm[b]));
     }
   }
   return array;
@@ -74,9 +73,8 @@ void check_firmware(const wire_info &info, const std::string &what) {
                 ") computes no locations, so there is nothing to calibrate; flash one of scene grasp");
   }
   if (!(info.capabilities & WIRE_CAPABILITY_RAW_STREAM)) {
-    throw Error(
-        what + ": its firmware (scene " + text_field(info.scene) +
-        ") sends no pressures; flash one of scene grasp, calibrate, and go back if you like: the calibration stays");
+    throw Error(what + ": its firmware (scene " + text_field(info.scene) +
+                ") sends no pressures; flash one of scene grasp, calibrate, and go back if you like: the calibration stays");
   }
   if (info.rate_mHz != 0 && info.rate_mHz < 1000.0 * FRAME_RATE_MIN_Hz) {
     throw Error(what + ": " + fixed(info.rate_mHz / 1000.0, 1) +
@@ -85,13 +83,11 @@ void check_firmware(const wire_info &info, const std::string &what) {
 }
 
 GainSession::GainSession(const wire_info &info)
-    : array_(array_of(info)), prior_{static_cast<double>(info.prior_sigma_mm),
-                                     static_cast<double>(info.prior_width_mm)},
+    : array_(array_of(info)), prior_{static_cast<double>(info.prior_sigma_mm), static_cast<double>(info.prior_width_mm)},
       has_profile_((info.stored & WIRE_STORED_PAD) != 0), finder_(array_.sensors()) {}
 
 bool GainSession::take(const wire_packet &packet) {
-  if (packet.type != WIRE_RAW || packet.body.raw.sensor_count != array_.sensors() ||
-      (packet.body.raw.flags & CONTACT_FLAG_HELD)) {
+  if (packet.type != WIRE_RAW || packet.body.raw.sensor_count != array_.sensors() || (packet.body.raw.flags & CONTACT_FLAG_HELD)) {
     return false;
   }
   const Frame frame = frame_of(packet);
@@ -117,14 +113,10 @@ void GainSession::judge(bool last) {
 
 std::string GainSession::advice() const {
   switch (finder_.state()) {
-  case PlacementFinder::State::settling:
-    return "hold on";
-  case PlacementFinder::State::taken:
-    return "taken: lift it";
-  case PlacementFinder::State::refused:
-    return "it did not rest: lift it, and let it rest by itself";
-  case PlacementFinder::State::resting:
-    break;
+  case PlacementFinder::State::settling: return "hold on";
+  case PlacementFinder::State::taken: return "taken: lift it";
+  case PlacementFinder::State::refused: return "it did not rest: lift it, and let it rest by itself";
+  case PlacementFinder::State::resting: break;
   }
   if (finder_.refusal() == PlacementFinder::Refusal::light) {
     return "too light: use a weight that makes at least " + fixed(LIGHT_Pa / 1000.0, 1) + " kPa, about 1 N";
@@ -141,9 +133,8 @@ std::string GainSession::progress() const {
   const Solution &solution = judgement_.solution;
   if (solution.solved) {
     const Fitted &last = solution.placements.back();
-    text += ", the last at x " + fixed(last.x_mm, 1) + " y " + fixed(last.y_mm, 1) + " mm" +
-            (last.kept ? "" : " (fits no other)") + "; gains known to " + percent(solution.worst_shape_sd()) +
-            ", wanted " + percent(judgement_.wanted_sd);
+    text += ", the last at x " + fixed(last.x_mm, 1) + " y " + fixed(last.y_mm, 1) + " mm" + (last.kept ? "" : " (fits no other)") +
+            "; gains known to " + percent(solution.worst_shape_sd()) + ", wanted " + percent(judgement_.wanted_sd);
   }
   return text;
 }
@@ -157,8 +148,7 @@ calibration calibration_of(const Solution &solution, const std::optional<ForceSc
   const Shape found = shape_of(solution);
   made.sigma_um = micrometres(found.sigma_mm);
   made.sigma_sd_um = micrometres(found.sigma_sd_mm);
-  made.dip_share_q16 = static_cast<std::uint16_t>(
-      std::lround(std::min(65536.0 * found.dip_share, double(CALIBRATION_DIP_SHARE_MAX_Q16))));
+  made.dip_share_q16 = static_cast<std::uint16_t>(std::lround(std::min(65536.0 * found.dip_share, double(CALIBRATION_DIP_SHARE_MAX_Q16))));
   made.dip_sd_um = made.dip_share_q16 > 0 ? micrometres(found.dip_sd_mm) : std::uint16_t(0);
   for (std::size_t k = 0; k < solution.gain.size(); k++) {
     made.sensors[k] = {static_cast<float>(solution.gain[k]), static_cast<float>(solution.reading_sd[k]),
@@ -202,9 +192,8 @@ Shape GainSession::shape() const {
 
 Scatter GainSession::scatter(bool calibrated) const {
   const Solution &solution = judgement_.solution;
-  return calibrated
-             ? calibrating::scatter(array_, placements_, solution, judgement_.kept.gain, shape())
-             : calibrating::scatter(array_, placements_, solution, std::vector<double>(array_.sensors(), 1.0), prior_);
+  return calibrated ? calibrating::scatter(array_, placements_, solution, judgement_.kept.gain, shape())
+                    : calibrating::scatter(array_, placements_, solution, std::vector<double>(array_.sensors(), 1.0), prior_);
 }
 
 } // namespace fingertip::calibrating

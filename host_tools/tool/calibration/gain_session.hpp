@@ -21,8 +21,7 @@ Frame frame_of(const wire_packet &packet);
 /* What a fingertip must be able to do. what: it, for the message. Throws Error. */
 void check_firmware(const wire_info &info, const std::string &what);
 
-/* What a fingertip keeps of a solution; scale: none where the weight is not known. Its own ambient
- * pressure is not in it. */
+/* What a fingertip keeps of a solution; scale: none where the weight is not known. Its own ambient pressure is not in it. */
 calibration calibration_of(const Solution &solution, const std::optional<ForceScale> &scale, std::uint32_t date_s);
 
 class GainSession {

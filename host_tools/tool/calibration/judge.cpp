@@ -30,8 +30,7 @@ constexpr double LOADED_SHARE = 0.1;
 /* Sd of readings where a part is kept: on the twin's pads of 6 mm, as uneven as real ones, 0.2 % of the presses are
  * off by 1 mm without a warning with Assumptions::gain, none with this (20 placements, seed 7000). */
 constexpr double PART_SD = 0.3;
-/* With a dip that helps: 0.21 at most, of the twin's pads of 6 mm that have one (seed 7000), and 0.07 of the real pad
- * that chooses. */
+/* With a dip that helps: 0.21 at most, of the twin's pads of 6 mm that have one (seed 7000), and 0.07 of the real pad that chooses. */
 constexpr double ASTRAY_PITCHES = 0.25;
 /* Evidence refuses a session from EVIDENCE_SURE placements on. From EVIDENCE_MIN on it does so if it
  * is EVIDENCE_CLEAR times its bound; otherwise it only keeps a session from being good. */
@@ -56,8 +55,7 @@ double rms_beyond(const std::vector<double> &values, const std::vector<double> &
   return std::sqrt(std::max(all * all - chance * chance, 0.0));
 }
 
-/* Rms of e about its mean, of placements within the array: beyond it a force is extrapolated, and
- * rubber that ends near gives way. */
+/* Rms of e about its mean, of placements within the array: beyond it a force is extrapolated, and rubber that ends near gives way. */
 double force_share(const Array &array, const Solution &solution) {
   const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
   const auto [bottom, top] = std::minmax_element(array.y_mm.begin(), array.y_mm.end());
@@ -77,8 +75,7 @@ double force_share(const Array &array, const Solution &solution) {
   return rms(forces);
 }
 
-/* What zeros move between the rest and the readings of a placement, rms over the sensors: by the line through the rests
- * of all. */
+/* What zeros move between the rest and the readings of a placement, rms over the sensors: by the line through the rests of all. */
 double drift_Pa(const std::vector<Placement> &placements, std::size_t sensors) {
   std::vector<double> drifts_Pa;
   for (std::size_t k = 0; k < sensors; k++) {
@@ -160,11 +157,9 @@ Solution in_part(Solution solution, bool gains) {
   return solution;
 }
 
-/* Differences of the gains of odd and even placements beyond their uncertainty, and what of either brings the forces
- * that the firmware's fit has of the other nearest to each other: all are of one weight, which is the only truth in a
- * session. */
-void compare_halves(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
-                    Judgement &judgement) {
+/* Differences of the gains of odd and even placements beyond their uncertainty, and what of either brings the forces that the firmware's
+ * fit has of the other nearest to each other: all are of one weight, which is the only truth in a session. */
+void compare_halves(const Array &array, const std::vector<Placement> &placements, const Solution &solution, Judgement &judgement) {
   std::vector<Placement> halves[2];
   Solution from[2] = {solution, solution};
   from[0].placements.clear();
@@ -249,8 +244,7 @@ Reason lacking(const Array &array, const std::vector<Placement> &placements, con
     return Reason::cluster;
   }
   const double end_x = END_SHARE * (*right - *left), end_y = END_SHARE * (*top - *bottom);
-  if (unloaded || lowest_x > *left + end_x || highest_x < *right - end_x || lowest_y > *bottom + end_y ||
-      highest_y < *top - end_y) {
+  if (unloaded || lowest_x > *left + end_x || highest_x < *right - end_x || lowest_y > *bottom + end_y || highest_y < *top - end_y) {
     return Reason::one_end;
   }
   return placements.size() < PLACEMENTS_ENOUGH ? Reason::too_few : Reason::unsure;
@@ -259,27 +253,22 @@ Reason lacking(const Array &array, const std::vector<Placement> &placements, con
 std::string text_of(const Judgement &j, std::size_t placements) {
   const Solution &s = j.solution;
   switch (j.reason) {
-  case Reason::none:
-    return "good: every gain is known to " + percent(s.worst_shape_sd());
+  case Reason::none: return "good: every gain is known to " + percent(s.worst_shape_sd());
   case Reason::too_few:
     if (placements == 0) {
       return "no placement was found: set a weight of about 3 N on a round foot down, let it rest by itself for a "
              "second, and lift it";
     }
     return "too few placements (" + std::to_string(placements) + "): place the weight at more places all over the pad";
-  case Reason::cluster:
-    return "all placements are near one place" + too_little_load(j.unsure) + ": place the weight all over the pad";
-  case Reason::one_end:
-    return "part of the pad has no placements" + too_little_load(j.unsure) + ": place the weight there too";
+  case Reason::cluster: return "all placements are near one place" + too_little_load(j.unsure) + ": place the weight all over the pad";
+  case Reason::one_end: return "part of the pad has no placements" + too_little_load(j.unsure) + ": place the weight there too";
   case Reason::unsure:
     return "the gains of sensors " + list_of(j.unsure) + " are only known to " + percent(s.worst_shape_sd()) +
            ": place the weight near them; on thin rubber too few sensors measure a placement";
   case Reason::weights:
-    return "the force differed by " + percent(j.force_share) +
-           " between placements: use one and the same weight, resting freely";
+    return "the force differed by " + percent(j.force_share) + " between placements: use one and the same weight, resting freely";
   case Reason::elongated:
-    return "the contact is not round (its axes differ by " + percent(2.0 * j.ellipse) +
-           "): use a weight with a round foot, as a ball";
+    return "the contact is not round (its axes differ by " + percent(2.0 * j.ellipse) + "): use a weight with a round foot, as a ball";
   case Reason::offsets:
     return "the zeros of the sensors were off by " + percent(j.offset_share) +
            " of the peak: see that nothing touches the pad, tare, and begin again";
@@ -287,11 +276,9 @@ std::string text_of(const Judgement &j, std::size_t placements) {
     return "the zeros of the sensors move by " + percent(j.drift_share) +
            " of the peak in the second of a placement: let the fingertip warm up, and begin again";
   case Reason::slope:
-    return "the weight pulls along the pad with " + percent(j.slope) +
-           " of itself, more than is corrected: level the pad";
+    return "the weight pulls along the pad with " + percent(j.slope) + " of itself, more than is corrected: level the pad";
   case Reason::stray:
-    return "only " + percent(j.kept_share) +
-           " of the placements fit each other: let the same weight rest freely each time";
+    return "only " + percent(j.kept_share) + " of the placements fit each other: let the same weight rest freely each time";
   case Reason::residual:
     return "the readings are " + percent(s.residual_share) +
            " of the peak off that of one round foot: use one, and see that the pad is whole";
@@ -327,8 +314,7 @@ Evidence against(const Judgement &j) {
                           {Reason::stray, (1.0 - j.kept_share) / (1.0 - KEPT_MIN)},
                           {Reason::layout, s.spread.position_mm / POSITION_MAX_mm},
                           {Reason::residual, s.residual_share / RESIDUAL_MAX}};
-  return *std::max_element(std::begin(all), std::end(all),
-                           [](const Evidence &a, const Evidence &b) { return a.times < b.times; });
+  return *std::max_element(std::begin(all), std::end(all), [](const Evidence &a, const Evidence &b) { return a.times < b.times; });
 }
 
 /* The firmware's fit to a placement. */
@@ -339,8 +325,8 @@ struct FirmwareFit {
       x.push_back(static_cast<float>(array.x_mm[k]));
       y.push_back(static_cast<float>(array.y_mm[k]));
     }
-    usable_array = fit_array_init(&of, static_cast<std::uint8_t>(array.sensors()), x.data(), y.data(),
-                                  static_cast<float>(array.pitch_mm)) == FT_OK;
+    usable_array =
+        fit_array_init(&of, static_cast<std::uint8_t>(array.sensors()), x.data(), y.data(), static_cast<float>(array.pitch_mm)) == FT_OK;
     settings.iterations = ITERATIONS;
     settings.noise_Pa_q10 = NOISE_Pa_Q10;
     settings.cut_noises = CUT_NOISES;
@@ -353,8 +339,7 @@ struct FirmwareFit {
   std::optional<fit_result> operator()(const Placement &placement, const std::vector<double> &gain) {
     std::int32_t pressure[FT_MAX_SENSORS] = {};
     for (std::size_t k = 0; k < placement.reading_Pa.size(); k++) {
-      pressure[k] =
-          static_cast<std::int32_t>(std::lround(std::clamp(placement.reading_Pa[k] / gain[k], -1e6, 1e6) * 1024.0));
+      pressure[k] = static_cast<std::int32_t>(std::lround(std::clamp(placement.reading_Pa[k] / gain[k], -1e6, 1e6) * 1024.0));
     }
     fit_result result{};
     if (usable_array) {
@@ -365,8 +350,7 @@ struct FirmwareFit {
     }
     return result;
   }
-  /* The firmware's own settings (config/defaults.h), without a pad profile; a mean of many frames has hardly any noise.
-   */
+  /* The firmware's own settings (config/defaults.h), without a pad profile; a mean of many frames has hardly any noise. */
   static constexpr std::uint8_t ITERATIONS = 4, CUT_NOISES = 4;
   static constexpr std::int32_t NOISE_Pa_Q10 = 1024;
   std::vector<fit_own> own;
@@ -389,9 +373,8 @@ bool goes_astray(const Array &array, const Solution &s) {
       press.usable = (1u << array.sensors()) - 1u;
       for (std::size_t k = 0; k < array.sensors(); k++) {
         const double per = std::pow(std::hypot(array.x_mm[k] - x, array.y_mm[k] - y) / s.width_mm, 2) / 2.0;
-        press.reading_Pa.push_back(s.peak_Pa *
-                                   ((1.0 - s.mixing) * std::exp(-per) + s.mixing * std::exp(-per / (NARROW * NARROW)) -
-                                    s.dip * std::exp(-per / (s.dip_widths * s.dip_widths))));
+        press.reading_Pa.push_back(s.peak_Pa * ((1.0 - s.mixing) * std::exp(-per) + s.mixing * std::exp(-per / (NARROW * NARROW)) -
+                                                s.dip * std::exp(-per / (s.dip_widths * s.dip_widths))));
       }
       const auto found = fit(press, ones);
       if (!found || std::hypot(double(found->x_mm) - x, double(found->y_mm) - y) > ASTRAY_PITCHES * array.pitch_mm) {
@@ -405,9 +388,8 @@ bool goes_astray(const Array &array, const Solution &s) {
 } // namespace
 
 const char *name_of(Reason reason) {
-  static const char *const names[] = {"none",      "too_few", "cluster", "one_end", "unsure", "weights",
-                                      "elongated", "offsets", "drift",   "slope",   "stray",  "residual",
-                                      "halves",    "useless", "layout",  "silent"};
+  static const char *const names[] = {"none",  "too_few", "cluster", "one_end",  "unsure", "weights", "elongated", "offsets",
+                                      "drift", "slope",   "stray",   "residual", "halves", "useless", "layout",    "silent"};
   return names[static_cast<int>(reason)];
 }
 
@@ -471,8 +453,7 @@ Judgement judge(const Array &array, std::vector<Placement> placements, bool last
   }
   const Reason lacks = lacking(array, placements, s, !unloaded.empty());
   const bool all_over = s.solved && lacks != Reason::cluster && lacks != Reason::one_end;
-  const bool known =
-      all_over && placements.size() >= PLACEMENTS_WANTED && j.unsure.empty() && s.gauge_sd <= wanted_gauge_sd;
+  const bool known = all_over && placements.size() >= PLACEMENTS_WANTED && j.unsure.empty() && s.gauge_sd <= wanted_gauge_sd;
   if (evidence.times <= 1.0 && (known || (all_over && enough))) {
     compare_halves(array, placements, s, j);
   }
@@ -498,8 +479,8 @@ Judgement judge(const Array &array, std::vector<Placement> placements, bool last
 }
 
 Shape shape_of(const Solution &solution) {
-  Shape shape{solution.sigma_mm, std::hypot(solution.sigma_sd_mm, CONTACTS_SD_mm2 / (2.0 * solution.sigma_mm)),
-              solution.dip_share, solution.dip_sd_mm};
+  Shape shape{solution.sigma_mm, std::hypot(solution.sigma_sd_mm, CONTACTS_SD_mm2 / (2.0 * solution.sigma_mm)), solution.dip_share,
+              solution.dip_sd_mm};
   for (std::size_t k = 0; k < solution.own_width.size(); k++) {
     shape.own.push_back({solution.dx_mm[k], solution.dy_mm[k], solution.own_width[k]});
   }
@@ -512,9 +493,7 @@ Shape without_width(Shape shape) {
 }
 
 std::vector<fit_own> own_of(const Array &array, const Shape &shape) {
-  const auto q15 = [](double value) {
-    return static_cast<std::int32_t>(std::lround(std::clamp(32768.0 * value, -32767.0, 32767.0)));
-  };
+  const auto q15 = [](double value) { return static_cast<std::int32_t>(std::lround(std::clamp(32768.0 * value, -32767.0, 32767.0))); };
   std::vector<fit_own> made;
   for (const Own &own : shape.own) {
     made.push_back({q15(own.off_x_mm / array.pitch_mm), q15(own.off_y_mm / array.pitch_mm), q15(own.wider)});
@@ -522,8 +501,8 @@ std::vector<fit_own> own_of(const Array &array, const Shape &shape) {
   return made;
 }
 
-std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
-                                      const Solution &solution, double force_N, const Shape &shape) {
+std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
+                                      double force_N, const Shape &shape) {
   FirmwareFit fit(array, shape);
   std::vector<double> forces, fadings;
   for (std::size_t i = 0; i < placements.size(); i++) {
@@ -547,8 +526,8 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
   return ForceScale{force_N / middle, force_N / middle * std::hypot(by_chance, FORCE_MODEL_SD, faded)};
 }
 
-Scatter scatter(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
-                const std::vector<double> &gain, const Shape &shape) {
+Scatter scatter(const Array &array, const std::vector<Placement> &placements, const Solution &solution, const std::vector<double> &gain,
+                const Shape &shape) {
   FirmwareFit fit(array, shape);
   std::vector<double> dx_mm, dy_mm, distances, forces;
   for (std::size_t i = 0; i < placements.size(); i++) {

@@ -1,12 +1,11 @@
 /* Whether a calibration may be used, and if not, why, and what would help.
  *
- * Good: the calibration helps, and nothing in the session speaks against it. It helps if every gain
- * is known to SHAPE_SD_WANTED, or after PLACEMENTS_ENOUGH to HELPS_SHARE of how much they differ,
- * and if the gains from half of the placements make the firmware's fit of the other half better.
- * Where placements all over the pad do not determine every gain, and more would not either, but what one half found
- * brings the other's forces nearer to each other, the part that helps is kept: the gains, with readings as uncertain as
- * without them, or width and dip alone. It is good then, and reason says what is not known. Refused: what speaks
- * against it does not go away with more placements. More: neither yet.
+ * Good: the calibration helps, and nothing in the session speaks against it. It helps if every gain is known to SHAPE_SD_WANTED, or after
+ * PLACEMENTS_ENOUGH to HELPS_SHARE of how much they differ, and if the gains from half of the placements make the firmware's fit of the
+ * other half better. Where placements all over the pad do not determine every gain, and more would not either, but what one half found
+ * brings the other's forces nearer to each other, the part that helps is kept: the gains, with readings as uncertain as without them, or
+ * width and dip alone. It is good then, and reason says what is not known. Refused: what speaks against it does not go away with more
+ * placements. More: neither yet.
  *
  * The bounds on evidence lie between what good and bad sessions show: simulated pads of 12 mm, alike and as uneven as
  * real ones (report truth, part calibration, tables evidence_p1_p50_p99; chosen on seeds 5000 to 5011, judged from
@@ -115,8 +114,8 @@ std::vector<fit_own> own_of(const Array &array, const Shape &shape);
 struct ForceScale {
   double scale = 1.0, sd = 0.0;
 };
-std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements,
-                                      const Solution &solution, double force_N, const Shape &shape);
+std::optional<ForceScale> force_scale(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
+                                      double force_N, const Shape &shape);
 
 /* What a calibration is for: how far the firmware's fit scatters over the placements, with these gains and this shape.
  * Medians: of the distance of its locations from those of the solution, less what all have in common, of the force's
@@ -124,7 +123,7 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
 struct Scatter {
   double location_mm = 0.0, force = 0.0, force_mean = 0.0;
 };
-Scatter scatter(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
-                const std::vector<double> &gain, const Shape &shape);
+Scatter scatter(const Array &array, const std::vector<Placement> &placements, const Solution &solution, const std::vector<double> &gain,
+                const Shape &shape);
 
 } // namespace fingertip::calibrating

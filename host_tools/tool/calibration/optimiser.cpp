@@ -35,9 +35,7 @@ static void accumulate(const Reading &r, double weight, MatrixXd &global, Matrix
   local += weight * r.by_local * r.by_local.transpose();
 }
 
-double huber(double square) {
-  return square <= HUBER * HUBER ? square : 2.0 * HUBER * std::sqrt(square) - HUBER * HUBER;
-}
+double huber(double square) { return square <= HUBER * HUBER ? square : 2.0 * HUBER * std::sqrt(square) - HUBER * HUBER; }
 double huber_weight(double square) { return square <= HUBER * HUBER ? 1.0 : HUBER / std::sqrt(square); }
 
 Model::Model(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions)
@@ -131,8 +129,7 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double earlier_
   }
   const double t1 = g[layout.pull(0)], t2 = g[layout.pull(1)], along = t1 * u + t2 * v;
   const double value = full * ((1.0 - m) * wide + m * narrow - h * dip) + along * pulled;
-  const double by_square =
-      -full * ((1.0 - m) * wide * per + m * narrow * narrow_per - h * dip * dip_per) - along * pulled_per;
+  const double by_square = -full * ((1.0 - m) * wide * per + m * narrow * narrow_per - h * dip * dip_per) - along * pulled_per;
   const double by_log_width = -2.0 * square * by_square - along * pulled;
   const double by_u = by_square * (2.0 * u - 4.0 * q1 * u - 4.0 * q2 * v) + t1 * pulled;
   const double by_v = by_square * (2.0 * v + 4.0 * q1 * v - 4.0 * q2 * u) + t2 * pulled;
@@ -161,8 +158,7 @@ Reading Model::reading(const VectorXd &g, const Local &l, int k, double earlier_
 }
 
 double Model::residual(const Unknowns &unknowns, std::size_t i, int k) const {
-  return placements_[i].reading_Pa[std::size_t(k)] -
-         reading(unknowns.global, unknowns.locals[i], k, earlier_Pa(i, k)).model;
+  return placements_[i].reading_Pa[std::size_t(k)] - reading(unknowns.global, unknowns.locals[i], k, earlier_Pa(i, k)).model;
 }
 
 double Model::expected_sd(const Placement &placement, double reading_Pa) const {
@@ -387,8 +383,7 @@ void Optimiser::step(double damping, Unknowns &unknowns) const {
   }
 }
 
-double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions &given,
-                     const Eigen::MatrixXd &covariance) {
+double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions &given, const Eigen::MatrixXd &covariance) {
   const Layout &layout = model.layout;
   const auto &[global, locals] = optimiser.at;
   const std::vector<Placement> &placements = model.placements();

@@ -66,9 +66,7 @@ public:
   /* A reading less that of the model, Pa. */
   double residual(const Unknowns &unknowns, std::size_t i, int k) const;
   double expected_sd(const Placement &placement, double reading_Pa) const;
-  double expected_sd(const Placement &placement, int k) const {
-    return expected_sd(placement, placement.reading_Pa[std::size_t(k)]);
-  }
+  double expected_sd(const Placement &placement, int k) const { return expected_sd(placement, placement.reading_Pa[std::size_t(k)]); }
   double earlier_Pa(std::size_t i, int k) const {
     const std::vector<double> &earlier_Pa = placements_[i].earlier_Pa;
     return earlier_Pa.empty() ? 0.0 : earlier_Pa[std::size_t(k)];
@@ -79,9 +77,7 @@ public:
 
   const std::vector<Placement> &placements() const { return placements_; }
   double excess() const { return excess_; }
-  Spread spread() const {
-    return {assumed_.position_mm, assumed_.force, assumed_.width, assumed_.ellipse, assumed_.own_width};
-  }
+  Spread spread() const { return {assumed_.position_mm, assumed_.force, assumed_.width, assumed_.ellipse, assumed_.own_width}; }
   /* From now on, instead of what was assumed. */
   void assume(const Spread &spread, double excess);
 
@@ -138,7 +134,6 @@ private:
 
 /* Gives the model the spreads that the session shows, by expectation and maximisation, each held to what was
  * assumed. covariance: the optimiser's, at its present point. Returns the largest relative change. */
-double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions &given,
-                     const Eigen::MatrixXd &covariance);
+double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions &given, const Eigen::MatrixXd &covariance);
 
 } // namespace fingertip::calibrating

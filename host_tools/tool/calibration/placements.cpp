@@ -219,8 +219,8 @@ std::optional<Placement> PlacementFinder::settled(double t_s) {
     shift = std::max(shift, std::abs(changes[k] - common * share));
   }
   const double noise = NOISE_Pa / std::sqrt(frames / slots);
-  const bool still = std::abs(common) <= DECAY_MAX * sum + NOISE_SDS * noise &&
-                     shift <= SHIFT_MAX * peak + NOISE_SDS * noise && sway <= SWAY_MAX * peak + SWAY_NOISES * noise;
+  const bool still = std::abs(common) <= DECAY_MAX * sum + NOISE_SDS * noise && shift <= SHIFT_MAX * peak + NOISE_SDS * noise &&
+                     sway <= SWAY_MAX * peak + SWAY_NOISES * noise;
   if (peak < LIGHT_Pa && still) {
     /* Rubber that comes back after a release is like that, too: the level to rest at now. */
     state_ = State::resting;

@@ -4,10 +4,9 @@
  * decided against the readings just before, so neither the firmware's gate nor the level of its zero matters. While a
  * contact lasts its zero goes on to fade with what the rubber kept of presses before: that is taken off the readings.
  *
- * A contact begins where a reading rises by TOUCH_Pa within a second. It is a placement once it
- * has rested for a second: then the mean of the readings from 0.5 to 1 s is taken, above the mean
- * of the half second before the contact. To rest means that over that time the readings only decay
- * steadily, as rubber relaxes (the limits below, noise allowed for). A finger is not as
+ * A contact begins where a reading rises by TOUCH_Pa within a second. It is a placement once it has rested for a second: then the mean of
+ * the readings from 0.5 to 1 s is taken, above the mean of the half second before the contact. To rest means that over that time the
+ * readings only decay steadily, as rubber relaxes (the limits below, noise allowed for). A finger is not as
  * still: it sways by tenths of a millimetre, each of which is 1.7 % on the flank of a contact, and its force trembles
  * by percents. A contact that rests for the first time more than LATE_s after the touch is no placement either. */
 #pragma once

@@ -88,8 +88,7 @@ std::optional<PullFrame> PullFinder::still(double span_s, double mean_s) const {
   if (frames_.front().t_s > begin_s) {
     return std::nullopt;
   }
-  const auto begin =
-      std::find_if(frames_.begin(), frames_.end(), [&](const PullFrame &each) { return each.t_s >= begin_s; });
+  const auto begin = std::find_if(frames_.begin(), frames_.end(), [&](const PullFrame &each) { return each.t_s >= begin_s; });
   if (static_cast<double>(std::distance(begin, frames_.end())) < PULL_RATE_MIN_Hz * span_s) {
     return std::nullopt; /* too few of them came */
   }
@@ -104,9 +103,7 @@ std::optional<PullFrame> PullFinder::still(double span_s, double mean_s) const {
     return std::nullopt;
   }
   const double mean_begin_s = frames_.back().t_s - mean_s;
-  return mean_of(std::find_if(begin, frames_.end(), [&](const PullFrame &each) { return each.t_s >= mean_begin_s; }),
-                 frames_.end())
-      .mean;
+  return mean_of(std::find_if(begin, frames_.end(), [&](const PullFrame &each) { return each.t_s >= mean_begin_s; }), frames_.end()).mean;
 }
 
 std::optional<Pull> PullFinder::refuse(Refusal why) {
@@ -164,8 +161,7 @@ std::optional<Pull> PullFinder::take(const PullFrame &frame) {
     return std::nullopt;
   }
   state_ = State::taken;
-  return Pull{frame.t_s,   pulled->qx_N - rest_.qx_N, pulled->qy_N - rest_.qy_N, pulled->force_N, pulled->x_mm,
-              pulled->y_mm};
+  return Pull{frame.t_s, pulled->qx_N - rest_.qx_N, pulled->qy_N - rest_.qy_N, pulled->force_N, pulled->x_mm, pulled->y_mm};
 }
 
 PullJudgement judge_pulls(const std::vector<Pull> &pulls, double known_N, bool last) {
@@ -178,8 +174,7 @@ PullJudgement judge_pulls(const std::vector<Pull> &pulls, double known_N, bool l
   };
   const State lacking = last ? State::refused : State::more;
   const auto lacks = [&](std::size_t there, std::size_t wanted, const std::string &of) {
-    return ends(lacking,
-                std::to_string(there) + " of " + std::to_string(wanted) + " pulls" + of + (last ? "; pull more" : ""));
+    return ends(lacking, std::to_string(there) + " of " + std::to_string(wanted) + " pulls" + of + (last ? "; pull more" : ""));
   };
   if (pulls.empty()) {
     return lacks(0, PULLS_WANTED, "");
@@ -204,8 +199,8 @@ PullJudgement judge_pulls(const std::vector<Pull> &pulls, double known_N, bool l
     return lacks(pulls.size(), PULLS_WANTED, "");
   }
   if (static_cast<double>(all.count) < PULLS_KEPT_MIN * static_cast<double>(pulls.size())) {
-    return ends(State::refused, "only " + std::to_string(all.count) + " of " + std::to_string(pulls.size()) +
-                                    " pulls agree within " + fixed(100.0 * PULL_STRAY_MAX, 0) +
+    return ends(State::refused, "only " + std::to_string(all.count) + " of " + std::to_string(pulls.size()) + " pulls agree within " +
+                                    fixed(100.0 * PULL_STRAY_MAX, 0) +
                                     " %; use one and the same weight, and keep the string level and free");
   }
   for (const std::size_t axis : {0U, 1U}) {
@@ -220,13 +215,12 @@ PullJudgement judge_pulls(const std::vector<Pull> &pulls, double known_N, bool l
         continue;
       }
       const double difference = std::abs(ways[a].mean() - ways[b].mean()) / all.mean();
-      const double variance = ways[a].variance() / static_cast<double>(ways[a].count) +
-                              ways[b].variance() / static_cast<double>(ways[b].count);
+      const double variance =
+          ways[a].variance() / static_cast<double>(ways[a].count) + ways[b].variance() / static_cast<double>(ways[b].count);
       if (difference > WAYS_MAX + 2.0 * std::sqrt(variance) / all.mean()) {
         return ends(State::refused, std::string("directions disagree: pulls towards ") + WAYS[b] + " read " +
                                         fixed(ways[b].mean() * known_N, 2) + " N, towards " + WAYS[a] + " " +
-                                        fixed(ways[a].mean() * known_N, 2) +
-                                        " N; keep the string level, and calibrate the gains first");
+                                        fixed(ways[a].mean() * known_N, 2) + " N; keep the string level, and calibrate the gains first");
       }
     }
   }
@@ -235,8 +229,7 @@ PullJudgement judge_pulls(const std::vector<Pull> &pulls, double known_N, bool l
 
 void check_pad(const wire_info &info, const std::string &what) {
   if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL)) {
-    throw Error(what + ": its firmware (scene " + text_field(info.scene) +
-                ") reports no tangential force; flash one of scene grasp");
+    throw Error(what + ": its firmware (scene " + text_field(info.scene) + ") reports no tangential force; flash one of scene grasp");
   }
   if (!(info.stored & WIRE_STORED_PAD)) {
     throw Error(what + ": no pad profile; fingertip pad --thickness MM first");
@@ -247,9 +240,7 @@ void check_pad(const wire_info &info, const std::string &what) {
   }
 }
 
-PullSession::PullSession(const wire_info &info, double known_N) : pad_(info.pad), known_N_(known_N), finder_(known_N) {
-  judge(false);
-}
+PullSession::PullSession(const wire_info &info, double known_N) : pad_(info.pad), known_N_(known_N), finder_(known_N) { judge(false); }
 
 bool PullSession::take(const wire_packet &packet) {
   const wire_contact &contact = packet.body.contact;
@@ -259,8 +250,7 @@ bool PullSession::take(const wire_packet &packet) {
   PullFrame frame;
   frame.t_s = 1e-6 * static_cast<double>(packet.t_us);
   frame.contact = contact.flags & CONTACT_FLAG_CONTACT;
-  frame.good = (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) &&
-               !(contact.flags & (CONTACT_FLAG_MOVING | CONTACT_FLAG_SLIDING)) &&
+  frame.good = (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) && !(contact.flags & (CONTACT_FLAG_MOVING | CONTACT_FLAG_SLIDING)) &&
                !(contact.flags & warning_flags() & ~HARMLESS);
   frame.qx_N = static_cast<double>(contact.qx_N);
   frame.qy_N = static_cast<double>(contact.qy_N);
@@ -277,19 +267,14 @@ bool PullSession::take(const wire_packet &packet) {
 
 std::string PullSession::advice() const {
   switch (finder_.state()) {
-  case PullFinder::State::settling:
-    return "release it, and leave it alone";
-  case PullFinder::State::resting:
-    return "pull: hang the weight on its string";
-  case PullFinder::State::pulled:
-    return "hold on";
-  case PullFinder::State::taken:
-    return "taken: take it off the pad";
+  case PullFinder::State::settling: return "release it, and leave it alone";
+  case PullFinder::State::resting: return "pull: hang the weight on its string";
+  case PullFinder::State::pulled: return "hold on";
+  case PullFinder::State::taken: return "taken: take it off the pad";
   case PullFinder::State::refused:
     return finder_.refusal() == PullFinder::Refusal::slid ? "it slid: take it off, and press it down harder"
                                                           : weak_text() + "; take it off";
-  case PullFinder::State::free:
-    break;
+  case PullFinder::State::free: break;
   }
   return "set the object down, its string slack";
 }
@@ -297,9 +282,9 @@ std::string PullSession::advice() const {
 std::string PullSession::last_pull_text() const {
   const Pull &pull = pulls_.back();
   const double degrees = std::atan2(pull.qy_N, pull.qx_N) * 180.0 / M_PI;
-  return "pull " + std::to_string(pulls_.size()) + " at x " + fixed(pull.x_mm, 1) + " y " + fixed(pull.y_mm, 1) +
-         " mm: reads " + fixed(std::hypot(pull.qx_N, pull.qy_N), 2) + " N towards " + fixed(degrees, 0) +
-         " degrees, under " + fixed(pull.force_N, 2) + " N";
+  return "pull " + std::to_string(pulls_.size()) + " at x " + fixed(pull.x_mm, 1) + " y " + fixed(pull.y_mm, 1) + " mm: reads " +
+         fixed(std::hypot(pull.qx_N, pull.qy_N), 2) + " N towards " + fixed(degrees, 0) + " degrees, under " + fixed(pull.force_N, 2) +
+         " N";
 }
 
 std::string PullSession::weak_text() const {
@@ -312,8 +297,8 @@ pad_profile PullSession::scaled(pad_profile pad) const {
   pad.tangential_scale = static_cast<float>(scale);
   pad.tangential_scale_sd = static_cast<float>(scale * judgement_.reading_sd);
   if (!pad_profile_is_valid(&pad)) {
-    throw Error("the readings are not those of " + fixed(known_N_, 2) + " N: they make " +
-                fixed(known_N_ * judgement_.reading, 2) + " N; give the force that pulled");
+    throw Error("the readings are not those of " + fixed(known_N_, 2) + " N: they make " + fixed(known_N_ * judgement_.reading, 2) +
+                " N; give the force that pulled");
   }
   return pad;
 }

@@ -62,8 +62,7 @@ public:
   std::optional<Pull> take(const PullFrame &frame);
 
   State state() const { return state_; }
-  /* Why the last contact was none: State::refused. weak: the known force is less than PULL_SDS_MIN
-   * standard deviations. */
+  /* Why the last contact was none: State::refused. weak: the known force is less than PULL_SDS_MIN standard deviations. */
   Refusal refusal() const { return refusal_; }
   double sd_N() const { return rest_.q_sd_N; } /* at rest */
 
@@ -79,17 +78,15 @@ private:
   PullFrame rest_;
 };
 
-/* Bounds, chosen on simulated pads of 12 mm whose sensors' gains are right within 2 % (twin, drags
- * of 120 s by 0.15 to 0.45 of the normal force, seeds 1 to 40): a pull differs from its session's
- * median by 3 % rms, one in a hundred by 10 %, none by more than 16 %; the ways' means differ by
- * 3.5 % in the median and at most by 11 %. On seeds 41 to 60 none of 59 is refused, and their
- * scales scatter by 0.7 % and claim 1.3. Where gains are off by 10 % pulls differ by 9 % rms. */
+/* Bounds, chosen on simulated pads of 12 mm whose sensors' gains are right within 2 % (twin, drags of 120 s by 0.15 to 0.45 of the normal
+ * force, seeds 1 to 40): a pull differs from its session's median by 3 % rms, one in a hundred by 10 %, none by more than 16 %; the ways'
+ * means differ by 3.5 % in the median and at most by 11 %. On seeds 41 to 60 none of 59 is refused, and their scales scatter by 0.7 % and
+ * claim 1.3. Where gains are off by 10 % pulls differ by 9 % rms. */
 constexpr std::size_t PULLS_WANTED = 8;
 constexpr std::size_t PULLS_OF_AN_AXIS = 3; /* within 45 degrees of x, and of y */
 constexpr double PULL_STRAY_MAX = 0.2;      /* from the median, of it: what is farther is left out */
 constexpr double PULLS_KEPT_MIN = 0.75;     /* share */
-/* Between the means of the ways +x, +y, -x, -y that have two pulls at least, beyond two standard
- * deviations of the difference. */
+/* Between the means of the ways +x, +y, -x, -y that have two pulls at least, beyond two standard deviations of the difference. */
 constexpr double WAYS_MAX = 0.1;
 /* What no scatter shows: a string 8 degrees from level pulls 1 % less. */
 constexpr double KNOWN_SD = 0.01;
@@ -108,8 +105,7 @@ PullJudgement judge_pulls(const std::vector<Pull> &pulls, double known_N, bool l
 /* What a fingertip must be able to do, and know. what: it, for the message. Throws Error. */
 void check_pad(const wire_info &info, const std::string &what);
 
-/* One session: a fingertip's packets in, pulls, what to do next, and the pad's profile in the end. For every program
- * that calibrates. */
+/* One session: a fingertip's packets in, pulls, what to do next, and the pad's profile in the end. For every program that calibrates. */
 class PullSession {
 public:
   /* known_N: what pulls. */

@@ -41,14 +41,12 @@ struct GaussianMixture {
   std::vector<std::pair<double, double>> terms; /* height, width */
 };
 
-/* The mean product over the sensors: seen from contacts on the array they lie about as a Gaussian
- * of the width reach does. */
+/* The mean product over the sensors: seen from contacts on the array they lie about as a Gaussian of the width reach does. */
 double overlap(const GaussianMixture &a, const GaussianMixture &b, double reach) {
   double sum = 0.0;
   for (const auto &[height, width] : a.terms) {
     for (const auto &[other_height, other_width] : b.terms) {
-      sum +=
-          height * other_height / (1.0 / (width * width) + 1.0 / (other_width * other_width) + 1.0 / (reach * reach));
+      sum += height * other_height / (1.0 / (width * width) + 1.0 / (other_width * other_width) + 1.0 / (reach * reach));
     }
   }
   return sum;
@@ -162,8 +160,7 @@ std::vector<double> outside_gauge(const Array &array, const std::vector<double> 
 }
 
 double Solution::worst_shape_sd() const {
-  return shape_sd.empty() ? std::numeric_limits<double>::infinity()
-                          : *std::max_element(shape_sd.begin(), shape_sd.end());
+  return shape_sd.empty() ? std::numeric_limits<double>::infinity() : *std::max_element(shape_sd.begin(), shape_sd.end());
 }
 
 void set_earlier(std::vector<Placement> &placements) {
@@ -189,8 +186,8 @@ double median(std::vector<double> values) {
 
 namespace {
 
-Solution solve_any(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions,
-                   bool keep_all, const Solution *from) {
+Solution solve_any(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions, bool keep_all,
+                   const Solution *from) {
   for (const Placement &placement : placements) {
     if (placement.reading_Pa.size() != array.sensors()) {
       throw std::invalid_argument("a placement has as many readings as the array has sensors");
@@ -234,9 +231,8 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
         misfit += local[j] * local[j] / (sd[j] * sd[j]);
       }
       const double all = std::max(count, 1.0), rms_share = std::sqrt(left_squares / all) / peak_Pa;
-      solution.placements[i] = {
-          optimiser.kept[i],      local[0], local[1], local[2], local[3], {local[4], local[5]}, rms_share,
-          std::sqrt(misfit / all)};
+      solution.placements[i] = {optimiser.kept[i],      local[0], local[1], local[2], local[3], {local[4], local[5]}, rms_share,
+                                std::sqrt(misfit / all)};
       if (optimiser.kept[i]) {
         squares += left_squares;
         readings += count;
@@ -265,8 +261,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
     look();
   }
   MatrixXd covariance = optimiser.covariance();
-  for (int round = 0;
-       !from && round < LEARN_ROUNDS && learn_spreads(model, optimiser, assumptions, covariance) > LEARNT; round++) {
+  for (int round = 0; !from && round < LEARN_ROUNDS && learn_spreads(model, optimiser, assumptions, covariance) > LEARNT; round++) {
     optimiser.descend(1);
     covariance = optimiser.covariance();
   }
@@ -295,8 +290,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
     const int width = layout.own_width(k);
     const double reading = of_gains(k, k) + 2.0 * OWN_WIDTH_SQUARE * covariance(k, width) +
                            OWN_WIDTH_SQUARE * OWN_WIDTH_SQUARE * covariance(width, width) +
-                           OWN_WIDTH_SQUARE * 0.5 *
-                               (covariance(layout.dx(k), layout.dx(k)) + covariance(layout.dy(k), layout.dy(k))) *
+                           OWN_WIDTH_SQUARE * 0.5 * (covariance(layout.dx(k), layout.dx(k)) + covariance(layout.dy(k), layout.dy(k))) *
                                std::exp(-2.0 * global[layout.log_width()]);
     solution.reading_sd.push_back(std::sqrt(std::max(reading, of_gains(k, k))));
     solution.shape_sd.push_back(std::sqrt(std::max(of_shape(k, k), 0.0)));
@@ -305,8 +299,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
     solution.dx_mm.push_back(global[layout.dx(k)]);
     solution.dy_mm.push_back(global[layout.dy(k)]);
     solution.memory.push_back(global[layout.memory(k)]);
-    solution.misfit_share.push_back(std::sqrt(of_sensor[std::size_t(k)] / std::max(counts[std::size_t(k)], 1.0)) /
-                                    peak_Pa);
+    solution.misfit_share.push_back(std::sqrt(of_sensor[std::size_t(k)] / std::max(counts[std::size_t(k)], 1.0)) / peak_Pa);
     solution.own_width.push_back(global[layout.own_width(k)]);
   }
   solution.peak_Pa = peak_Pa * mean;
@@ -323,11 +316,9 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
   solution.dip_widths = std::exp(global[layout.dip_width()]);
   const double offset = global.segment(layout.offset(0), layout.sensors).mean() / peak_Pa;
   const auto near = [&](double mixing) {
-    return equivalent_gaussian({{{1.0 - mixing, 1.0},
-                                 {mixing, NARROW},
-                                 {-solution.dip, solution.dip_widths},
-                                 {offset, std::numeric_limits<double>::infinity()}}},
-                               solution.dip_widths, reach_mm(array) / solution.width_mm);
+    return equivalent_gaussian(
+        {{{1.0 - mixing, 1.0}, {mixing, NARROW}, {-solution.dip, solution.dip_widths}, {offset, std::numeric_limits<double>::infinity()}}},
+        solution.dip_widths, reach_mm(array) / solution.width_mm);
   };
   const auto [width, dip_share] = near(solution.mixing);
   solution.sigma_mm = solution.width_mm * width;
@@ -335,8 +326,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
   solution.dip_sd_mm = solution.dip_widths * solution.width_mm;
   /* Derivatives by the width and the mixing, which counteract each other. */
   constexpr double STEP = 0.05;
-  const double by_mixing =
-      (near(solution.mixing + STEP).width - near(solution.mixing - STEP).width) / (2.0 * STEP * width);
+  const double by_mixing = (near(solution.mixing + STEP).width - near(solution.mixing - STEP).width) / (2.0 * STEP * width);
   const int at_width = layout.log_width(), at_mixing = layout.mixing();
   const double variance = covariance(at_width, at_width) + 2.0 * by_mixing * covariance(at_width, at_mixing) +
                           by_mixing * by_mixing * covariance(at_mixing, at_mixing);
@@ -347,18 +337,15 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
 
 } // namespace
 
-Solution solve(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions,
-               bool keep_all) {
+Solution solve(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions, bool keep_all) {
   return solve_any(array, placements, assumptions, keep_all, nullptr);
 }
 
-Solution solve_from(const Array &array, const std::vector<Placement> &placements, const Solution &from,
-                    const Assumptions &assumptions) {
+Solution solve_from(const Array &array, const std::vector<Placement> &placements, const Solution &from, const Assumptions &assumptions) {
   return solve_any(array, placements, assumptions, true, &from);
 }
 
-Wanted next_place(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
-                  const Assumptions &assumptions) {
+Wanted next_place(const Array &array, const std::vector<Placement> &placements, const Solution &solution, const Assumptions &assumptions) {
   std::vector<double> x_mm, y_mm;
   const double step = 0.5 * array.pitch_mm;
   const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
@@ -379,8 +366,8 @@ Wanted next_place(const Array &array, const std::vector<Placement> &placements, 
     for (std::size_t c = 0; c < x_mm.size(); c++) {
       double nearest = placements.empty() ? -std::hypot(x_mm[c], y_mm[c]) + 1e3 : 1e3;
       for (const Placement &placement : placements) {
-        const auto strongest = static_cast<std::size_t>(
-            std::max_element(placement.reading_Pa.begin(), placement.reading_Pa.end()) - placement.reading_Pa.begin());
+        const auto strongest = static_cast<std::size_t>(std::max_element(placement.reading_Pa.begin(), placement.reading_Pa.end()) -
+                                                        placement.reading_Pa.begin());
         nearest = std::min(nearest, std::hypot(x_mm[c] - array.x_mm[strongest], y_mm[c] - array.y_mm[strongest]));
       }
       if (nearest > farthest) {

@@ -1,42 +1,37 @@
 /* Gains of the sensors from placements of one weight.
  *
- * The same weight on the same rounded foot is set down at places that are not measured. Then every
- * placement presses with the same force and, on a pad of one thickness, with the same profile; what
- * differs between a reading and that profile at its distance is the sensor's. With placement i at
- * (x, y), its squared distance R from sensor k and c = NARROW,
+ * The same weight on the same rounded foot is set down at places that are not measured. Then every placement presses with the same force
+ * and, on a pad of one thickness, with the same profile; what differs between a reading and that profile at its distance is the sensor's.
+ * With placement i at (x, y), its squared distance R from sensor k and c = NARROW,
  *
  *   reading = g_k A exp(e - 2 w) [(1 - m) exp(-R / 2 S^2) + m exp(-R / 2 c^2 S^2)
  *                                 - h exp(-R / 2 B^2 S^2) + (t1 u + t2 v) / S P(R / S^2)] + o_k - r_k M_k,
  *   S = s exp(w + b_k),   R = u^2 + v^2 - 2 q1 (u^2 - v^2) - 4 q2 u v
  *
- * One profile for all: peak A, width s, the dip's over it B and mixing m are fitted along, so nothing need be known of
- * the pad or the foot. The mixture of two Gaussians is within 0.33 % of the peak of the pressure under spheres and flat
- * ends on 6, 9 and 12 mm of bonded rubber (the twin's tables, 3 and 10 N), where one Gaussian is off by up to 3.4 %.
- * Widths per placement (w) keep the force, 2 pi A s^2.
- * Cast rubber has a dip (h, of the width B S) around that: -1 to -2 % of the peak three to five widths away, on every
- * pad of host_tools/report/real; bonded rubber in the twin has none.
+ * One profile for all: peak A, width s, the dip's over it B and mixing m are fitted along, so nothing need be known of the pad or the foot.
+ * The mixture of two Gaussians is within 0.33 % of the peak of the pressure under spheres and flat ends on 6, 9 and 12 mm of bonded rubber
+ * (the twin's tables, 3 and 10 N), where one Gaussian is off by up to 3.4 %. Widths per placement (w) keep the force, 2 pi A s^2. Cast
+ * rubber has a dip (h, of the width B S) around that: -1 to -2 % of the peak three to five widths away, on every pad of
+ * host_tools/report/real; bonded rubber in the twin has none.
  *
  * A touch of unknown strength and width cannot determine a tilt and a bowl of the gains over the
- * pad: they move and widen the Gaussian. Only the equal force of all placements (e, up to
- * Assumptions::force) determines them, less surely than the rest. They are the gauge: the
- * subspace of log gains that 1, x, y and x^2 + y^2 span over the sensors.
+ * pad: they move and widen the Gaussian. Only the equal force of all placements (e, up to Assumptions::force) determines them, less surely
+ * than the rest. They are the gauge: the subspace of log gains that 1, x, y and x^2 + y^2 span over the sensors.
  *
- * All else that a session may hold is in the model with a prior around nothing, so that it neither passes for a gain
- * nor stays unseen: where the sensors sit (they are soldered by hand), sensors whose response is wider or narrower than
- * that of the others (b), zeros that were off (o), contacts that are not round (q, of all and of each), a pad or a hand
- * aslant (t: tangential force of all placements over their normal force, P as PULL has it). The posterior of each is in
- * the Solution; judge.hpp has the limits. Zeros that move are not in the readings, which are above those just before.
- * What a sensor alone keeps of a press is: of this one it is a constant share, and so part of its gain; of those before
- * (r) it fades between the rest and the readings. It is not much, but without it the dip passes for what it would be
- * elsewhere.
+ * All else that a session may hold is in the model with a prior around nothing, so that it neither passes for a gain nor stays unseen:
+ * where the sensors sit (they are soldered by hand), sensors whose response is wider or narrower than that of the others (b), zeros that
+ * were off (o), contacts that are not round (q, of all and of each), a pad or a hand aslant (t: tangential force of all placements over
+ * their normal force, P as PULL has it). The posterior of each is in the Solution; judge.hpp has the limits. Zeros that move are not in the
+ * readings, which are above those just before. What a sensor alone keeps of a press is: of this one it is a constant share, and so part of
+ * its gain; of those before (r) it fades between the rest and the readings. It is not much, but without it the dip passes for what it would
+ * be elsewhere.
  *
  * How large the spreads of b, e, w, q and of the places are, and the model's own error, is learnt from the session
  * itself (expectation and maximisation, from the Assumptions as the start): sensors that are where they should be
  * determine the gains better than others, with smaller standard deviations.
  *
- * Robust least squares (Huber) by Levenberg-Marquardt, the placements' own unknowns eliminated; a
- * placement that does not fit the others is dropped as a whole. The same input gives the same
- * bits. Thirty placements of fifteen sensors take some 10 ms. */
+ * Robust least squares (Huber) by Levenberg-Marquardt, the placements' own unknowns eliminated; a placement that does not fit the others is
+ * dropped as a whole. The same input gives the same bits. Thirty placements of fifteen sensors take some 10 ms. */
 #pragma once
 
 #include <cstdint>
@@ -170,8 +165,7 @@ constexpr std::size_t PLACEMENTS_MIN = 3;
 
 /* Throws std::invalid_argument if a placement has another number of readings than the array has
  * sensors. keep_all: drop none, to compare with another solver. */
-Solution solve(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions = {},
-               bool keep_all = false);
+Solution solve(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions = {}, bool keep_all = false);
 
 /* The solution of some placements of a session, with the spreads of all of it, beginning where
  * all of it ended; from.placements are theirs. A few placements alone may have a second optimum. */

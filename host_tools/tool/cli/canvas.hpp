@@ -37,8 +37,7 @@ public:
   int columns() const { return columns_; }
   int rows() const { return rows_; }
   const Cell &cell(int column, int row) const {
-    return cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                  static_cast<std::size_t>(column)];
+    return cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column)];
   }
 
   /* Writes UTF-8 text of one-column characters; what lies outside is cut off. Without a background

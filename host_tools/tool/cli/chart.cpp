@@ -39,9 +39,7 @@ private:
   std::int64_t step_;
 };
 
-std::string braille(unsigned dots) {
-  return {'\xE2', static_cast<char>(0xA0 | dots >> 6), static_cast<char>(0x80 | (dots & 0x3F))};
-}
+std::string braille(unsigned dots) { return {'\xE2', static_cast<char>(0xA0 | dots >> 6), static_cast<char>(0x80 | (dots & 0x3F))}; }
 
 /* The bit of a dot: column 0 or 1, row 0 to 3 from above. */
 unsigned braille_bit(int column, int row) {
@@ -88,9 +86,8 @@ ChartPoint point_of(const Curve &curve, const Times &times, int dot) {
   ChartPoint point;
   times.each(curve.last, dot, [&](std::int64_t interval) {
     const ChartPoint here = curve.at(interval);
-    bool better =
-        here.value && (!point.value || (point.doubtful && !here.doubtful) ||
-                       (point.doubtful == here.doubtful && (curve.goes_both_ways || *here.value > *point.value)));
+    bool better = here.value && (!point.value || (point.doubtful && !here.doubtful) ||
+                                 (point.doubtful == here.doubtful && (curve.goes_both_ways || *here.value > *point.value)));
     if (better) {
       point.value = here.value;
       point.doubtful = here.doubtful;
@@ -173,12 +170,10 @@ constexpr float LEAST_PULL_N = 0.5f;
 using Sample = Model::Sample;
 
 /* there: whether an interval has the value; alarm: where it is shown red; null: never. */
-Curve curve_of(const Model &model, bool Sample::*there, float Sample::*value, bool goes_both_ways,
-               bool Sample::*alarm) {
+Curve curve_of(const Model &model, bool Sample::*there, float Sample::*value, bool goes_both_ways, bool Sample::*alarm) {
   return {[&model, there, value, alarm](std::int64_t interval) {
             const Sample &sample = model.samples()[interval];
-            return ChartPoint{sample.*there ? std::optional<float>(sample.*value) : std::nullopt, sample.doubtful,
-                              alarm && sample.*alarm};
+            return ChartPoint{sample.*there ? std::optional<float>(sample.*value) : std::nullopt, sample.doubtful, alarm && sample.*alarm};
           },
           model.samples().last(), goes_both_ways};
 }
@@ -195,9 +190,7 @@ float round_above(float value) {
   return 10 * power;
 }
 
-bool has_room_for_charts(const Area &area) {
-  return area.width - GUTTER >= FEWEST_COLUMNS && area.height >= FEWEST_ROWS;
-}
+bool has_room_for_charts(const Area &area) { return area.width - GUTTER >= FEWEST_COLUMNS && area.height >= FEWEST_ROWS; }
 
 void each_shown(const Area &area, std::int64_t last, const std::function<void(std::int64_t interval)> &visit) {
   const Times times(area.width - GUTTER);
@@ -221,9 +214,7 @@ void draw_charts(Canvas &canvas, const Area &area, const std::vector<Chart> &cha
   draw_time(canvas, {area.left + GUTTER, top, columns, 1}, times.span_s());
 }
 
-Curve force_curve(const Model &model) {
-  return curve_of(model, &Sample::fitted, &Sample::force_N, false, &Sample::slip);
-}
+Curve force_curve(const Model &model) { return curve_of(model, &Sample::fitted, &Sample::force_N, false, &Sample::slip); }
 
 void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
   constexpr int shortest = 4;
@@ -260,8 +251,8 @@ void draw_traces(Canvas &canvas, const Area &area, const Model &model) {
   pull_N = round_above(pull_N);
   std::vector<Chart> charts = {{"force", "N", 0, round_above(force_N), std::nullopt, {force_curve(model)}}};
   const bool three_axes = model.has_pad();
-  const auto signed_chart = [&](const char *name, const char *unit, float reach, bool Sample::*there,
-                                float Sample::*value, bool Sample::*alarm) {
+  const auto signed_chart = [&](const char *name, const char *unit, float reach, bool Sample::*there, float Sample::*value,
+                                bool Sample::*alarm) {
     charts.push_back({name, unit, -reach, reach, 0.0f, {curve_of(model, there, value, true, alarm)}});
   };
   if (three_axes) {

@@ -35,9 +35,8 @@ static std::size_t letters_apart(const std::string &one, const std::string &othe
 }
 
 template <typename Value>
-static CLI::Option *with_choice(CLI::App *command, const std::string &option,
-                                const std::map<std::string, Value> &values, const std::string &allowed, Value &value,
-                                const std::string &help) {
+static CLI::Option *with_choice(CLI::App *command, const std::string &option, const std::map<std::string, Value> &values,
+                                const std::string &allowed, Value &value, const std::string &help) {
   return command->add_option_function<std::string>(
       option,
       [=, &value](const std::string &text) {
@@ -82,9 +81,8 @@ int CommandLine::run(int argc, char **argv) {
     if (!meant.empty()) {
       throw WrongUsage("\"" + std::string(argv[1]) + "\" is no command; is " + meant + " meant? see fingertip --help");
     }
-    throw WrongUsage(
-        (argc < 2 ? "a command is missing" : "\"" + std::string(argv[1]) + "\" is no command") + "; give one of " +
-        joined(commands, ", ", [](const CLI::App *command) { return command->get_name(); }) + "; see fingertip --help");
+    throw WrongUsage((argc < 2 ? "a command is missing" : "\"" + std::string(argv[1]) + "\" is no command") + "; give one of " +
+                     joined(commands, ", ", [](const CLI::App *command) { return command->get_name(); }) + "; see fingertip --help");
   }
   try {
     app_.parse(argc, argv);
@@ -104,31 +102,27 @@ void check_recording(const std::string &path, bool overwrite) {
 }
 
 void with_transport(CLI::App *command, Reach &reach) {
-  with_choice<Reach>(
-      command, "--transport",
-      {{"auto", Reach::automatic}, {"socket", Reach::socket}, {"serial", Reach::serial}, {"usb", Reach::usb}},
-      "auto, socket, serial or usb", reach,
-      "socket (of fingertip serve), serial, usb (libusb, past the system's driver), or auto: the first of these that "
-      "there is")
+  with_choice<Reach>(command, "--transport",
+                     {{"auto", Reach::automatic}, {"socket", Reach::socket}, {"serial", Reach::serial}, {"usb", Reach::usb}},
+                     "auto, socket, serial or usb", reach,
+                     "socket (of fingertip serve), serial, usb (libusb, past the system's driver), or auto: the first of these that "
+                     "there is")
       ->type_name("KIND");
 }
 
 void with_port_only(CLI::App *command, Choice &choice) {
-  with_value(command, "PATH", "--port", choice.port,
-             "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip plugged in");
+  with_value(command, "PATH", "--port", choice.port, "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip plugged in");
   with_transport(command, choice.reach);
 }
 
 void with_port(CLI::App *command, Choice &choice) {
-  with_value(command, "SERIAL", "--device", choice.device,
-             "Serial number of the fingertip; default: the only one there is");
+  with_value(command, "SERIAL", "--device", choice.device, "Serial number of the fingertip; default: the only one there is");
   with_port_only(command, choice);
 }
 
 void with_seconds(CLI::App *command, std::optional<double> &seconds, const std::string &help) {
   with_number(
-      command, "--seconds", 0.001, 1e9, "a number from 0.001 to 1e9", [&seconds](double value) { seconds = value; },
-      help)
+      command, "--seconds", 0.001, 1e9, "a number from 0.001 to 1e9", [&seconds](double value) { seconds = value; }, help)
       ->type_name("S");
 }
 
@@ -142,8 +136,8 @@ void with_colour(CLI::App *command, ColourMode &mode) {
       ->type_name("MODE");
 }
 
-CLI::Option *with_number(CLI::App *command, const std::string &option, double low, double high,
-                         const std::string &allowed, std::function<void(double)> set, const std::string &help) {
+CLI::Option *with_number(CLI::App *command, const std::string &option, double low, double high, const std::string &allowed,
+                         std::function<void(double)> set, const std::string &help) {
   return command->add_option_function<std::string>(
       option,
       [=](const std::string &text) {

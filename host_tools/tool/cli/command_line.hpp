@@ -53,14 +53,13 @@ void with_seconds(CLI::App *command, std::optional<double> &seconds, const std::
 void with_colour(CLI::App *command, ColourMode &mode);
 
 /* An option with a value, and what the help calls that; arguments: as add_option has them. */
-template <typename... Arguments>
-CLI::Option *with_value(CLI::App *command, const char *kind, Arguments &&...arguments) {
+template <typename... Arguments> CLI::Option *with_value(CLI::App *command, const char *kind, Arguments &&...arguments) {
   return command->add_option(std::forward<Arguments>(arguments)...)->type_name(kind);
 }
 
 /* A number from low to high; allowed: how the error states them. */
-CLI::Option *with_number(CLI::App *command, const std::string &option, double low, double high,
-                         const std::string &allowed, std::function<void(double)> set, const std::string &help);
+CLI::Option *with_number(CLI::App *command, const std::string &option, double low, double high, const std::string &allowed,
+                         std::function<void(double)> set, const std::string &help);
 
 /* Where an option's text is no value of it. */
 [[noreturn]] void wrong_value(const std::string &option, const std::string &text, const std::string &allowed);

@@ -22,18 +22,14 @@ constexpr const char *SIDES[] = {"left", "right"};
 Colour colour_of(std::uint8_t state) {
   switch (state) {
   case GRIP_HOLDING:
-  case GRIP_READY:
-    return GOOD;
+  case GRIP_READY: return GOOD;
   case GRIP_SLIPPING:
   case GRIP_DROPPED:
   case GRIP_MISSED:
-  case GRIP_FAULT:
-    return BAD;
+  case GRIP_FAULT: return BAD;
   case GRIP_IDLE:
-  case GRIP_OPEN:
-    return FAINT;
-  default:
-    return WARNING;
+  case GRIP_OPEN: return FAINT;
+  default: return WARNING;
   }
 }
 
@@ -82,14 +78,12 @@ int draw_fingertip(Canvas &canvas, const Area &area, const Model &model, std::si
   canvas.text(column, area.top, "●", text_style(colour, true));
   column += 2;
   bool fine = model.state() == Model::State::replay || colour == GOOD;
-  canvas.text(column, area.top, first_columns(fine ? name : state, area.left + room - column),
-              text_style(fine ? FAINT : colour));
+  canvas.text(column, area.top, first_columns(fine ? name : state, area.left + room - column), text_style(fine ? FAINT : colour));
   return room;
 }
 
 /* Filled up to the force, with a mark where it is wanted; the whole is the cap. */
-void draw_force(Canvas &canvas, const Area &area, const Measured &measured, float wanted_N, float cap_N,
-                Colour colour) {
+void draw_force(Canvas &canvas, const Area &area, const Measured &measured, float wanted_N, float cap_N, Colour colour) {
   float full_N = cap_N > 0 ? cap_N : 20;
   auto cells = [&](float force_N) {
     return static_cast<int>(std::lround(std::clamp(force_N / full_N, 0.0f, 1.0f) * static_cast<float>(area.width)));
@@ -121,8 +115,8 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
   for (const std::string &line : flowed({state_text(report.state)}, " ", area.width)) {
     canvas.text(area.left, row++, first_columns(line, area.width), text_style(colour_of(report.state), true));
   }
-  int column = draw_quantity(canvas, area.left, row,
-                             {"width ", status ? std::optional(fixed(status->width_mm, 1)) : std::nullopt, 6, "mm"});
+  int column =
+      draw_quantity(canvas, area.left, row, {"width ", status ? std::optional(fixed(status->width_mm, 1)) : std::nullopt, 6, "mm"});
   if (status && status->moving) {
     canvas.text(column + 1, row, "moving", text_style(WARNING));
   } else if (status && status->object) {
@@ -131,25 +125,21 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
   row++;
   for (std::size_t i = 0; i < fingertips.size() && i < 2; i++, row++) {
     const Measured measured = measured_by(fingertips[i]);
-    column = draw_quantity(
-        canvas, area.left, row,
-        {i == 0 ? "left  " : "right ",
-         measured.force_N ? std::optional((measured.at_least ? "≥" : "") + number(*measured.force_N, 2)) : std::nullopt,
-         6, "N ", measured.doubtful});
+    column = draw_quantity(canvas, area.left, row,
+                           {i == 0 ? "left  " : "right ",
+                            measured.force_N ? std::optional((measured.at_least ? "≥" : "") + number(*measured.force_N, 2)) : std::nullopt,
+                            6, "N ", measured.doubtful});
     int width = area.left + area.width - column - 1;
     if (width >= 4) {
-      draw_force(canvas, {column + 1, row, width, 1}, measured, static_cast<float>(report.wanted_N), grip.cap_N(),
-                 i == 0 ? LEFT : RIGHT);
+      draw_force(canvas, {column + 1, row, width, 1}, measured, static_cast<float>(report.wanted_N), grip.cap_N(), i == 0 ? LEFT : RIGHT);
     }
   }
   column = draw_quantity(canvas, area.left, row, {"wanted", newton(report.wanted_N), 6, "N "});
   draw_quantity(canvas, column + 1, row, {"cap", number(grip.cap_N(), 1), 5, "N"});
   row++;
   bool loaded = report.load_N > 0;
-  column = draw_quantity(canvas, area.left, row,
-                         {"load  ", loaded ? std::optional(newton(report.load_N)) : std::nullopt, 6, "N "});
-  draw_quantity(canvas, column + 1, row,
-                {"margin", report.margin > 0 ? std::optional(fixed(report.margin, 2)) : std::nullopt, 5, ""});
+  column = draw_quantity(canvas, area.left, row, {"load  ", loaded ? std::optional(newton(report.load_N)) : std::nullopt, 6, "N "});
+  draw_quantity(canvas, column + 1, row, {"margin", report.margin > 0 ? std::optional(fixed(report.margin, 2)) : std::nullopt, 5, ""});
   row++;
   column = draw_quantity(canvas, area.left, row, {"slides", std::to_string(report.slides), 6, "  "});
   column = draw_quantity(canvas, column + 1, row, {"friction", fixed(report.friction, 2), 4, " "});
@@ -173,14 +163,12 @@ void draw_panel(Canvas &canvas, const Area &area, const std::vector<Model> &fing
   }
 }
 
-Curve grip_curve(const GripModel &grip, bool GripModel::Sample::*there, float GripModel::Sample::*value,
-                 Colour colour) {
-  return {
-      [&grip, there, value](std::int64_t interval) {
-        const GripModel::Sample &sample = grip.samples()[interval];
-        return ChartPoint{sample.*there ? std::optional<float>(sample.*value) : std::nullopt, false, sample.slipping};
-      },
-      grip.samples().last(), true, colour};
+Curve grip_curve(const GripModel &grip, bool GripModel::Sample::*there, float GripModel::Sample::*value, Colour colour) {
+  return {[&grip, there, value](std::int64_t interval) {
+            const GripModel::Sample &sample = grip.samples()[interval];
+            return ChartPoint{sample.*there ? std::optional<float>(sample.*value) : std::nullopt, false, sample.slipping};
+          },
+          grip.samples().last(), true, colour};
 }
 
 void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &fingertips, const GripModel &grip) {
@@ -205,28 +193,20 @@ void draw_over_time(Canvas &canvas, const Area &area, const std::vector<Model> &
     load_N = sample.loaded ? std::max(load_N, sample.load_N) : load_N;
     width_mm = sample.answered ? std::max(width_mm, sample.width_mm) : width_mm;
   });
-  draw_charts(
-      canvas, area,
-      {{"force", "N", 0, round_above(force_N), std::nullopt, std::move(forces)},
-       {"load", "N", 0, round_above(load_N), std::nullopt, {grip_curve(grip, &Shown::loaded, &Shown::load_N, ACCENT)}},
-       {"width",
-        "mm",
-        0,
-        round_above(width_mm),
-        std::nullopt,
-        {grip_curve(grip, &Shown::answered, &Shown::width_mm, ACCENT)}}});
+  draw_charts(canvas, area,
+              {{"force", "N", 0, round_above(force_N), std::nullopt, std::move(forces)},
+               {"load", "N", 0, round_above(load_N), std::nullopt, {grip_curve(grip, &Shown::loaded, &Shown::load_N, ACCENT)}},
+               {"width", "mm", 0, round_above(width_mm), std::nullopt, {grip_curve(grip, &Shown::answered, &Shown::width_mm, ACCENT)}}});
 }
 
 } // namespace
 
-Canvas draw_grasp(const std::vector<Model> &fingertips, const GripModel &grip, const Caption &caption, int columns,
-                  int rows) {
+Canvas draw_grasp(const std::vector<Model> &fingertips, const GripModel &grip, const Caption &caption, int columns, int rows) {
   Canvas canvas(columns, rows);
   if (is_too_small(canvas)) {
     int row = 1;
     for (const std::string &line :
-         flowed({state_text(grip.row() ? grip.row()->report.state : std::uint8_t{GRIP_IDLE}), grip_line(grip)}, "\n",
-                columns)) {
+         flowed({state_text(grip.row() ? grip.row()->report.state : std::uint8_t{GRIP_IDLE}), grip_line(grip)}, "\n", columns)) {
       canvas.text(0, row++, line);
     }
     draw_caption(canvas, caption);

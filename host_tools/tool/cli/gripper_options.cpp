@@ -15,22 +15,18 @@ static std::string only_port() {
   for (const GripperPort &port : ports) {
     names += " " + port.path;
   }
-  throw WrongUsage(ports.empty()
-                       ? "no serial port on USB is here; name the gripper's with --port (of grasp, --gripper-port)"
-                       : "choose one with --port (of grasp, --gripper-port):" + names);
+  throw WrongUsage(ports.empty() ? "no serial port on USB is here; name the gripper's with --port (of grasp, --gripper-port)"
+                                 : "choose one with --port (of grasp, --gripper-port):" + names);
 }
 
 void with_gripper_line(CLI::App *command, GripperWay &way) {
   with_value(command, "N", "--slave", way.slave, "Its address on the line; default: 9, of a servo 6");
-  with_value(command, "COUNT", "--closed", way.closed_count,
-             "Position that it reports when its pads touch; default: 230, of a servo 2048");
-  with_value(command, "COUNT", "--open", way.open_count,
-             "Position that it reports when it is open; default: 3, of a servo 2700");
+  with_value(command, "COUNT", "--closed", way.closed_count, "Position that it reports when its pads touch; default: 230, of a servo 2048");
+  with_value(command, "COUNT", "--open", way.open_count, "Position that it reports when it is open; default: 3, of a servo 2700");
   with_value(command, "MM", "--jaw", way.jaw_mm, "Of a servo: from its axis to the middle of the pad; default: 100 mm");
   command
       ->add_option_function<double>(
-          "--timeout", [&way](double timeout_ms) { way.timeout_s = timeout_ms / 1000; },
-          "Of one answer; default: 50 ms")
+          "--timeout", [&way](double timeout_ms) { way.timeout_s = timeout_ms / 1000; }, "Of one answer; default: 50 ms")
       ->type_name("MS");
 }
 

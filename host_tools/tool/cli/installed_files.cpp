@@ -13,9 +13,7 @@ namespace fingertip {
 
 namespace fs = std::filesystem;
 
-static std::optional<fs::path> find_page() {
-  return find_installed({"../share/fingertip/web/index.html", "../../web/page/index.html"});
-}
+static std::optional<fs::path> find_page() { return find_installed({"../share/fingertip/web/index.html", "../../web/page/index.html"}); }
 
 fs::path this_program() {
   std::error_code none;
@@ -56,9 +54,8 @@ std::string page_note(const std::string &tool_version) {
   if (version == tool_version) {
     return "";
   }
-  return "the page beside this tool is of " +
-         (version.empty() ? "an unknown version" : "version " + printable(version)) + ", the tool of version " +
-         tool_version + "; install both from one release";
+  return "the page beside this tool is of " + (version.empty() ? "an unknown version" : "version " + printable(version)) +
+         ", the tool of version " + tool_version + "; install both from one release";
 }
 
 void become(const std::string &program, const std::vector<std::string> &arguments, const std::string &missing) {

@@ -9,8 +9,7 @@
 
 namespace fingertip {
 
-/* The first of these that exists, as seen from this program's folder: where it is installed, or in
- * the tree that it is built in. */
+/* The first of these that exists, as seen from this program's folder: where it is installed, or in the tree that it is built in. */
 std::optional<std::filesystem::path> find_installed(std::initializer_list<const char *> places);
 
 /* This program's own path. */
@@ -23,7 +22,6 @@ std::string page_note(const std::string &tool_version);
 
 /* Another program, a path or one of PATH, takes this one's place. Throws Error; missing: its text
  * where there is no such program, else what the system reports. */
-[[noreturn]] void become(const std::string &program, const std::vector<std::string> &arguments,
-                         const std::string &missing = "");
+[[noreturn]] void become(const std::string &program, const std::vector<std::string> &arguments, const std::string &missing = "");
 
 } // namespace fingertip

@@ -54,9 +54,7 @@ void KeyParser::feed(const char *bytes, std::size_t length, HostTime now) {
     case State::text: /* up to BEL or ESC \ */
       state_ = byte == '\a' ? State::plain : byte == ESCAPE ? State::text_escape : State::text;
       break;
-    case State::text_escape:
-      state_ = byte == '\\' ? State::plain : State::text;
-      break;
+    case State::text_escape: state_ = byte == '\\' ? State::plain : State::text; break;
     }
   }
 }
@@ -68,9 +66,8 @@ void KeyParser::take_special(char final_byte) {
     char final_byte;
     Key key;
   };
-  constexpr Special specials[] = {{"", 'A', KEY_UP},   {"", 'B', KEY_DOWN}, {"", 'C', KEY_RIGHT}, {"", 'D', KEY_LEFT},
-                                  {"", 'H', KEY_HOME}, {"", 'F', KEY_END},  {"1", '~', KEY_HOME}, {"7", '~', KEY_HOME},
-                                  {"4", '~', KEY_END}, {"8", '~', KEY_END}};
+  constexpr Special specials[] = {{"", 'A', KEY_UP},  {"", 'B', KEY_DOWN},  {"", 'C', KEY_RIGHT}, {"", 'D', KEY_LEFT}, {"", 'H', KEY_HOME},
+                                  {"", 'F', KEY_END}, {"1", '~', KEY_HOME}, {"7", '~', KEY_HOME}, {"4", '~', KEY_END}, {"8", '~', KEY_END}};
   for (const Special &special : specials) {
     if (!pasting_ && final_byte == special.final_byte && parameters_ == special.parameters) {
       keys_.push_back(special.key);

@@ -8,16 +8,15 @@
 
 namespace fingertip {
 
-static RecordingWriter writer_of(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready,
-                                 const std::string &port, std::int64_t host_zero_us, const Metadata &extra) {
+static RecordingWriter writer_of(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready, const std::string &port,
+                                 std::int64_t host_zero_us, const Metadata &extra) {
   Metadata head = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"started_utc", utc_now()}};
   std::vector<wire_info> infos;
   for (const DeviceNews &each : ready) {
     infos.push_back(each.packet.body.info);
   }
   const bool both = sends_both(infos[0]);
-  auto lines = make_lines(path, overwrite,
-                          path == STDOUT_NAME ? OutputFile::Appears::on_standard_output : OutputFile::Appears::at_once);
+  auto lines = make_lines(path, overwrite, path == STDOUT_NAME ? OutputFile::Appears::on_standard_output : OutputFile::Appears::at_once);
   if (ready.size() > 1) {
     head.insert(head.end(), extra.begin(), extra.end());
     return RecordingWriter(std::move(lines), infos, head, host_zero_us, both);
@@ -43,8 +42,8 @@ std::string utc_now() {
   return whole;
 }
 
-LiveRecording::LiveRecording(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready,
-                             const std::string &port, std::int64_t host_zero_us, const Metadata &extra)
+LiveRecording::LiveRecording(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready, const std::string &port,
+                             std::int64_t host_zero_us, const Metadata &extra)
     : to_standard_output_(path == STDOUT_NAME), writer_(writer_of(path, overwrite, ready, port, host_zero_us, extra)) {
   for (std::size_t i = 0; i < ready.size(); i++) {
     writer_.packet(i, ready[i].packet, static_cast<double>(host_zero_us));

@@ -18,8 +18,7 @@ std::string utc_now();
 
 class LiveRecording {
 public:
-  /* ready: the news of that kind of each fingertip; port: of the only one. extra: for the head of a recording
-   * of several. */
+  /* ready: the news of that kind of each fingertip; port: of the only one. extra: for the head of a recording of several. */
   LiveRecording(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready, const std::string &port,
                 std::int64_t host_zero_us, const Metadata &extra = {});
 

@@ -12,8 +12,7 @@
 int main(int argc, char **argv) {
   using namespace fingertip;
   try {
-    CommandLine line("Talks to Fingertip tactile sensors: shows, records and replays what they feel.",
-                     FINGERTIP_VERSION);
+    CommandLine line("Talks to Fingertip tactile sensors: shows, records and replays what they feel.", FINGERTIP_VERSION);
     for (auto add : {add_list,     add_info,      add_doctor,   add_monitor, add_record, add_replay, add_convert,
                      add_tare,     add_calibrate, add_validate, add_fit,     add_pad,    add_set,    add_serve,
                      add_simulate, add_web,       add_gripper,  add_grasp,   add_loader, add_flash,  add_rule}) {

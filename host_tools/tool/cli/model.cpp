@@ -29,17 +29,10 @@ void Model::take(const wire_packet &packet) {
       raw_ = packet.body.raw;
     }
     break;
-  case WIRE_INFO:
-    info_ = packet.body.info;
-    break;
-  case WIRE_HEALTH:
-    health_ = packet.body.health;
-    break;
-  case WIRE_SYNC:
-    edges_.take(packet.body.sync);
-    break;
-  default:
-    break;
+  case WIRE_INFO: info_ = packet.body.info; break;
+  case WIRE_HEALTH: health_ = packet.body.health; break;
+  case WIRE_SYNC: edges_.take(packet.body.sync); break;
+  default: break;
   }
 }
 
@@ -69,9 +62,7 @@ void Model::take_frame(std::uint64_t t_us) {
 
 void Model::take_contact(const wire_contact &contact, std::uint64_t t_us) {
   contact_ = contact;
-  auto note = [&](contact_flag flag, std::optional<std::uint64_t> &at_us) {
-    at_us = contact.flags & flag ? t_us : at_us;
-  };
+  auto note = [&](contact_flag flag, std::optional<std::uint64_t> &at_us) { at_us = contact.flags & flag ? t_us : at_us; };
   note(CONTACT_FLAG_SLIP, last_slip_us_);
   note(CONTACT_FLAG_SLIDING, last_sliding_us_);
   note(CONTACT_FLAG_MOVING, last_moving_us_);
@@ -121,9 +112,7 @@ bool Model::is_current() const {
   return state_ == State::replay || (state_ == State::live && silence_s && *silence_s <= STALLED_s);
 }
 
-bool Model::is_tared() const {
-  return raw_ ? raw_->flags & CONTACT_FLAG_TARED : contact_ && (contact_->flags & CONTACT_FLAG_TARED);
-}
+bool Model::is_tared() const { return raw_ ? raw_->flags & CONTACT_FLAG_TARED : contact_ && (contact_->flags & CONTACT_FLAG_TARED); }
 
 std::uint32_t Model::missing_sensors() const {
   return info_ && health_ ? fingertip::missing_sensors(health_->sensors_present, info_->sensor_count) : 0;
@@ -133,9 +122,7 @@ bool Model::is_without_sensors() const {
   return info_ && info_->sensor_count > 0 && missing_sensors() == fingertip::missing_sensors(0, info_->sensor_count);
 }
 
-double Model::seconds() const {
-  return static_cast<double>(before_restart_us_ + (first_us_ ? last_us_ - *first_us_ : 0)) / 1e6;
-}
+double Model::seconds() const { return static_cast<double>(before_restart_us_ + (first_us_ ? last_us_ - *first_us_ : 0)) / 1e6; }
 
 double Model::frames_per_s() const {
   if (recent_us_.size() < 2) {
@@ -144,13 +131,9 @@ double Model::frames_per_s() const {
   return static_cast<double>(recent_us_.size() - 1) * 1e6 / static_cast<double>(recent_us_.back() - recent_us_.front());
 }
 
-double Model::mean_frames_per_s() const {
-  return frames_ > 1 && seconds() > 0 ? static_cast<double>(frames_ - 1) / seconds() : 0;
-}
+double Model::mean_frames_per_s() const { return frames_ > 1 && seconds() > 0 ? static_cast<double>(frames_ - 1) / seconds() : 0; }
 
-bool Model::is_late(const std::optional<std::uint64_t> &at_us) const {
-  return at_us && last_us_ - *at_us <= SLIP_SHOWN_us;
-}
+bool Model::is_late(const std::optional<std::uint64_t> &at_us) const { return at_us && last_us_ - *at_us <= SLIP_SHOWN_us; }
 
 bool Model::estimates_tangential() const { return info_ && (info_->capabilities & WIRE_CAPABILITY_TANGENTIAL); }
 
@@ -196,8 +179,8 @@ std::string grip_line(const GripModel &grip) {
   const GripRow &row = *grip.row();
   const GripReport &report = row.report;
   std::string text = fixed(grip.seconds(), 1) + " s  " + state_name(report.state) + "  width " +
-                     (row.status ? fixed(row.status->width_mm, 1) : "-") + " mm  force " + fixed(report.force_N, 2) +
-                     " N  wanted " + fixed(report.wanted_N, 2) + " N  load " + fixed(report.load_N, 2) + " N";
+                     (row.status ? fixed(row.status->width_mm, 1) : "-") + " mm  force " + fixed(report.force_N, 2) + " N  wanted " +
+                     fixed(report.wanted_N, 2) + " N  load " + fixed(report.load_N, 2) + " N";
   if (report.margin > 0) {
     text += "  margin " + fixed(report.margin, 2);
   }

@@ -43,9 +43,7 @@ public:
   const Sample &operator[](std::int64_t interval) const {
     static const Sample none{};
     const std::int64_t oldest = last_ - static_cast<std::int64_t>(samples_.size()) + 1;
-    return interval >= oldest && interval <= last_ && !samples_.empty()
-               ? samples_[static_cast<std::size_t>(interval - oldest)]
-               : none;
+    return interval >= oldest && interval <= last_ && !samples_.empty() ? samples_[static_cast<std::size_t>(interval - oldest)] : none;
   }
   std::int64_t last() const { return last_; } /* the newest interval; 0 began with the time */
   std::size_t size() const { return samples_.size(); }
@@ -112,8 +110,7 @@ public:
   bool has_pad() const;
   /* Since the last frame, by the host's clock; nothing before the first. */
   std::optional<double> seconds_since_frame() const;
-  /* Whether the last frame's report still holds: false where none came for STALLED_s, and where
-   * the fingertip is gone. */
+  /* Whether the last frame's report still holds: false where none came for STALLED_s, and where the fingertip is gone. */
   bool is_current() const;
   /* The numbers of the last frame are differences from a measured zero. */
   bool is_tared() const;

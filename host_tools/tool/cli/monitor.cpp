@@ -53,8 +53,7 @@ struct Numbers {
 };
 
 std::string contact_in_words(float x_mm, float y_mm, float sd_mm, float force_N) {
-  return signed_number(x_mm, 1) + ", " + signed_number(y_mm, 1) + " mm, sd " + number(sd_mm, 2) + "; " +
-         number(force_N, 2) + " N";
+  return signed_number(x_mm, 1) + ", " + signed_number(y_mm, 1) + " mm, sd " + number(sd_mm, 2) + "; " + number(force_N, 2) + " N";
 }
 
 Numbers numbers_of(const Model &model) {
@@ -103,16 +102,11 @@ Numbers numbers_of(const Model &model) {
 
 std::string in_words(std::uint32_t flag, float limit_mm) {
   static constexpr std::pair<std::uint32_t, const char *> words[] = {
-      {CONTACT_FLAG_LOW_SIGNAL, "hardly above the noise"},
-      {CONTACT_FLAG_FLAT, "no peak, no location"},
-      {CONTACT_FLAG_UNCERTAIN, "may be off by more than "},
-      {CONTACT_FLAG_MODEL, "not one round contact"},
-      {CONTACT_FLAG_SATURATED, "a sensor is beyond its range"},
-      {CONTACT_FLAG_FORCE_LOWER_BOUND, "the force is at least this"},
-      {CONTACT_FLAG_SENSOR_MASKED, "a sensor is left out"},
-      {CONTACT_FLAG_AT_BOUND, "the fit stopped at its limit"},
-      {CONTACT_FLAG_ELONGATED, "the contact is not round"},
-      {CONTACT_FLAG_ZERO_DOUBTFUL, "the zero may have moved"},
+      {CONTACT_FLAG_LOW_SIGNAL, "hardly above the noise"},      {CONTACT_FLAG_FLAT, "no peak, no location"},
+      {CONTACT_FLAG_UNCERTAIN, "may be off by more than "},     {CONTACT_FLAG_MODEL, "not one round contact"},
+      {CONTACT_FLAG_SATURATED, "a sensor is beyond its range"}, {CONTACT_FLAG_FORCE_LOWER_BOUND, "the force is at least this"},
+      {CONTACT_FLAG_SENSOR_MASKED, "a sensor is left out"},     {CONTACT_FLAG_AT_BOUND, "the fit stopped at its limit"},
+      {CONTACT_FLAG_ELONGATED, "the contact is not round"},     {CONTACT_FLAG_ZERO_DOUBTFUL, "the zero may have moved"},
       {CONTACT_FLAG_SENSOR_DOUBTFUL, "a sensor is in doubt"}};
   const std::string limit = limit_mm > 0 ? number(limit_mm, 2) + " mm" : "the limit";
   for (auto [bit, text] : words) {
@@ -143,8 +137,7 @@ void draw_warnings(Canvas &canvas, const Area &area, const Model &model, std::ui
   auto lines = flowed(words, "; ", area.width);
   auto fits = [&] {
     return static_cast<int>(lines.size()) <= area.height &&
-           std::all_of(lines.begin(), lines.end(),
-                       [&](const std::string &line) { return columns_of(line) <= area.width; });
+           std::all_of(lines.begin(), lines.end(), [&](const std::string &line) { return columns_of(line) <= area.width; });
   };
   if (!fits()) {
     lines = flowed(names, " ", area.width);
@@ -153,16 +146,13 @@ void draw_warnings(Canvas &canvas, const Area &area, const Model &model, std::ui
   for (int i = 0; i < std::min(area.height, static_cast<int>(lines.size())); i++) {
     std::string text = lines[static_cast<std::size_t>(i)];
     bool last = cut && i + 1 == area.height;
-    canvas.text(area.left, area.top + i,
-                last ? first_columns(text, area.width - 4) + " ..." : first_columns(text, area.width),
+    canvas.text(area.left, area.top + i, last ? first_columns(text, area.width - 4) + " ..." : first_columns(text, area.width),
                 text_style(WARNING, true));
   }
 }
 
 std::string slip_unit(const Model &model) {
-  return model.info() && model.info()->slip_threshold_mm > 0
-             ? "of " + number(model.info()->slip_threshold_mm, 2) + " mm"
-             : "mm";
+  return model.info() && model.info()->slip_threshold_mm > 0 ? "of " + number(model.info()->slip_threshold_mm, 2) + " mm" : "mm";
 }
 
 /* The row after the last that it drew. */
@@ -229,18 +219,14 @@ int draw_numbers(Canvas &canvas, const Area &area, const Model &model, const Num
   }
   constexpr int second = 22;
   quantities({{0, "force", numbers.force, 9, "N"}, {second, "sd", numbers.force_sd, 6, "N", false}});
-  quantities(
-      {{0, "x", numbers.x, 7, ""}, {11, "y", numbers.y, 7, ""}, {second, "sd", numbers.location_sd, 6, "mm", false}});
-  quantities({{0, "σ", numbers.sigma, 7, ""},
-              {11, "peak", numbers.peak, 6, "kPa"},
-              {28, "residual", numbers.residual, 5, "Pa", false}});
+  quantities({{0, "x", numbers.x, 7, ""}, {11, "y", numbers.y, 7, ""}, {second, "sd", numbers.location_sd, 6, "mm", false}});
+  quantities({{0, "σ", numbers.sigma, 7, ""}, {11, "peak", numbers.peak, 6, "kPa"}, {28, "residual", numbers.residual, 5, "Pa", false}});
   if (numbers.stronger) {
     line("1 ", numbers.stronger);
     line("2 ", numbers.weaker);
   } else if (model.has_pad()) {
     canvas.text(left + second + 13, row, from_touch ? "since touch" : "", text_style(WARNING));
-    quantities(
-        {{0, "qx", numbers.qx, 6, ""}, {11, "qy", numbers.qy, 6, ""}, {second, "sd", numbers.q_sd, 6, "N", false}});
+    quantities({{0, "qx", numbers.qx, 6, ""}, {11, "qy", numbers.qy, 6, ""}, {second, "sd", numbers.q_sd, 6, "N", false}});
     lamps_of_motion(left + second + 4);
     quantities({{0, "Q/F", numbers.ratio, 5, ""}, {11, "sd", numbers.ratio_sd, 6, "", false}});
     if (numbers.edge) {
@@ -288,9 +274,9 @@ std::vector<Item> items_of(const Model &model) {
   if (model.contact()) {
     const wire_stages &stages = model.contact()->stages;
     items.push_back({"one frame", std::to_string(stages.total_us) + " µs", 8});
-    const std::pair<const char *, std::uint16_t> all[] = {
-        {"convert", stages.convert_us},     {"read", stages.read_us}, {"queue", stages.queue_us},
-        {"condition", stages.condition_us}, {"fit", stages.fit_us},   {"contact", stages.contact_us}};
+    const std::pair<const char *, std::uint16_t> all[] = {{"convert", stages.convert_us}, {"read", stages.read_us},
+                                                          {"queue", stages.queue_us},     {"condition", stages.condition_us},
+                                                          {"fit", stages.fit_us},         {"contact", stages.contact_us}};
     for (const auto &[name, us] : all) {
       items.push_back(count(name, us, false, 4));
     }
@@ -319,8 +305,7 @@ int draw_items(Canvas *canvas, const Area &area, const std::vector<Item> &items)
     }
     if (canvas && row < area.height) {
       int at = canvas->text(column, area.top + row, item.label + " ", text_style(FAINT));
-      canvas->text(at, area.top + row, right_aligned(item.value, item.width),
-                   text_style(item.colour, item.colour == BAD));
+      canvas->text(at, area.top + row, right_aligned(item.value, item.width), text_style(item.colour, item.colour == BAD));
     }
     column += length + 2;
   }
@@ -375,8 +360,8 @@ void draw_small(Canvas &canvas, const std::vector<Model> &models, const Caption 
     canvas.text(0, row++, (model.info() ? text_field(model.info()->serial) + " " : "") + state, text_style(colour));
     int column = 0;
     for (const Quantity &quantity :
-         {Quantity{"force", numbers.force, 6, "N ", numbers.doubtful},
-          Quantity{"x", numbers.x, 6, "", numbers.doubtful}, Quantity{"y", numbers.y, 6, "", numbers.doubtful}}) {
+         {Quantity{"force", numbers.force, 6, "N ", numbers.doubtful}, Quantity{"x", numbers.x, 6, "", numbers.doubtful},
+          Quantity{"y", numbers.y, 6, "", numbers.doubtful}}) {
       column = draw_quantity(canvas, column, row, quantity);
     }
     row++;
@@ -404,9 +389,8 @@ Canvas draw_monitor(const std::vector<Model> &models, const Caption &caption, in
   draw_bar(canvas, {0, 0, columns, 1});
   int column = canvas.text(1, 0, "FINGERTIP ", {WHITE, BAR, true});
   canvas.text(column, 0,
-              shown < count
-                  ? std::to_string(shown) + " of " + std::to_string(count) + " fingertips, a larger window shows more"
-                  : std::to_string(count) + " fingertips",
+              shown < count ? std::to_string(shown) + " of " + std::to_string(count) + " fingertips, a larger window shows more"
+                            : std::to_string(count) + " fingertips",
               {shown < count ? WARNING : FAINT, BAR, false});
   int width = columns / across, height = (rows - 2) / down;
   for (int i = 0; i < shown; i++) {

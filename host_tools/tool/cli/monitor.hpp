@@ -13,7 +13,6 @@ Canvas draw_monitor(const std::vector<Model> &models, const Caption &caption, in
 
 /* A grasp, likewise: the pads of both fingertips, left and right, side by side, beside them the gripper and what its
  * controller wants, below them both over time. */
-Canvas draw_grasp(const std::vector<Model> &fingertips, const GripModel &grip, const Caption &caption, int columns,
-                  int rows);
+Canvas draw_grasp(const std::vector<Model> &fingertips, const GripModel &grip, const Caption &caption, int columns, int rows);
 
 } // namespace fingertip

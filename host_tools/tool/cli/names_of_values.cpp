@@ -26,8 +26,7 @@ std::uint32_t missing_sensors(std::uint32_t present, std::uint8_t sensor_count) 
 std::string present_text(std::uint32_t present, std::uint8_t sensor_count) {
   std::uint32_t missing = missing_sensors(present, sensor_count);
   auto count = sensor_count - std::bitset<32>(missing).count();
-  return std::to_string(count) + " of " + std::to_string(sensor_count) +
-         (missing ? ", missing: " + sensors_text(missing) : "");
+  return std::to_string(count) + " of " + std::to_string(sensor_count) + (missing ? ", missing: " + sensors_text(missing) : "");
 }
 
 std::string rate_text(std::uint32_t rate_mHz) { return rate_mHz ? fixed(rate_mHz / 1000.0, 3) : "max"; }
@@ -50,20 +49,18 @@ std::string shape_text(const calibration &calibration) {
   if (calibration.sigma_um == 0) {
     return "a usual contact: not known";
   }
-  return "a usual contact: sigma " + fixed(1e-3 * calibration.sigma_um, 2) + " mm, sd " +
-         fixed(1e-3 * calibration.sigma_sd_um, 2) + " mm; dip around it " +
-         fixed(100.0 * calibration.dip_share_q16 / 65536.0, 1) + " % of its peak";
+  return "a usual contact: sigma " + fixed(1e-3 * calibration.sigma_um, 2) + " mm, sd " + fixed(1e-3 * calibration.sigma_sd_um, 2) +
+         " mm; dip around it " + fixed(100.0 * calibration.dip_share_q16 / 65536.0, 1) + " % of its peak";
 }
 
 void print_gains(const calibration &calibration, std::uint8_t sensor_count, const std::vector<double> &misfit_share) {
   constexpr int HALF = 10;
   constexpr double PER_MARK = 0.02;
-  const bool has_places =
-      std::any_of(calibration.sensors, calibration.sensors + sensor_count, [](const sensor_calibration &sensor) {
-        return sensor.off_x_um != 0 || sensor.off_y_um != 0 || sensor.wider_q15 != 0;
-      });
-  std::printf("\nsensor    gain    sd %%%s%s   -20 %%      mean      +20 %%\n",
-              misfit_share.empty() ? "" : "  misfit %", has_places ? "  off by x, y mm  wider by %" : "");
+  const bool has_places = std::any_of(calibration.sensors, calibration.sensors + sensor_count, [](const sensor_calibration &sensor) {
+    return sensor.off_x_um != 0 || sensor.off_y_um != 0 || sensor.wider_q15 != 0;
+  });
+  std::printf("\nsensor    gain    sd %%%s%s   -20 %%      mean      +20 %%\n", misfit_share.empty() ? "" : "  misfit %",
+              has_places ? "  off by x, y mm  wider by %" : "");
   for (int k = 0; k < sensor_count; k++) {
     const sensor_calibration &sensor = calibration.sensors[k];
     char misfit[16] = "", place[64] = "";
@@ -74,13 +71,11 @@ void print_gains(const calibration &calibration, std::uint8_t sensor_count, cons
       std::snprintf(place, sizeof place, "%+9.2f %+6.2f  %+10.1f", 1e-3 * sensor.off_x_um, 1e-3 * sensor.off_y_um,
                     100.0 * std::expm1(sensor.wider_q15 / 32768.0));
     }
-    int marks =
-        std::clamp(static_cast<int>(std::lround((static_cast<double>(sensor.gain) - 1) / PER_MARK)), -HALF, HALF);
+    int marks = std::clamp(static_cast<int>(std::lround((static_cast<double>(sensor.gain) - 1) / PER_MARK)), -HALF, HALF);
     std::string below(static_cast<std::size_t>(std::max(-marks, 0)), '#');
     std::string above(static_cast<std::size_t>(std::max(marks, 0)), '#');
-    std::printf("%6d  %6.3f  %6.1f%s%s   %*s%s|%s\n", k, static_cast<double>(sensor.gain),
-                100.0 * static_cast<double>(sensor.gain_sd), misfit, place, HALF + 2 - static_cast<int>(below.size()),
-                "", below.c_str(), above.c_str());
+    std::printf("%6d  %6.3f  %6.1f%s%s   %*s%s|%s\n", k, static_cast<double>(sensor.gain), 100.0 * static_cast<double>(sensor.gain_sd),
+                misfit, place, HALF + 2 - static_cast<int>(below.size()), "", below.c_str(), above.c_str());
   }
 }
 

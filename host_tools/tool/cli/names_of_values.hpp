@@ -33,7 +33,6 @@ std::string shape_text(const calibration &calibration);
 /* On standard output a row for each sensor: its gain, how far it lies from its place in the layout along x and y, how
  * much wider than the others its response is, and a bar from the mean to its gain. Of a calibration that has no places,
  * only the gains. misfit_share: of each sensor, or none (calibration/solver.hpp). */
-void print_gains(const calibration &calibration, std::uint8_t sensor_count,
-                 const std::vector<double> &misfit_share = {});
+void print_gains(const calibration &calibration, std::uint8_t sensor_count, const std::vector<double> &misfit_share = {});
 
 } // namespace fingertip

@@ -34,9 +34,7 @@ Colour heat(float part) {
 
 float heat_part(float pressure_Pa) { return std::sqrt(std::max(pressure_Pa, 0.0f) / FULL_SCALE_Pa); }
 
-bool is_bright(const std::optional<Colour> &colour) {
-  return colour && colour->r * 3 + colour->g * 6 + colour->b > 1300;
-}
+bool is_bright(const std::optional<Colour> &colour) { return colour && colour->r * 3 + colour->g * 6 + colour->b > 1300; }
 
 class Picture : public PadScale {
 public:
@@ -46,8 +44,7 @@ public:
 
   int cells_of(float mm) const { return static_cast<int>(mm / pixel_mm()); }
   Colour &pixel(int column, int pixel_row) {
-    return pixels_[static_cast<std::size_t>(pixel_row) * static_cast<std::size_t>(columns()) +
-                   static_cast<std::size_t>(column)];
+    return pixels_[static_cast<std::size_t>(pixel_row) * static_cast<std::size_t>(columns()) + static_cast<std::size_t>(column)];
   }
   void paint(int column, int pixel_row, Colour colour, float part) {
     if (column >= 0 && column < columns() && pixel_row >= 0 && pixel_row < 2 * rows()) {
@@ -70,8 +67,7 @@ private:
 
 /* The fit that may be drawn. */
 const wire_contact *fit_of(const Model &model) {
-  return model.is_current() && model.contact() && (model.contact()->flags & CONTACT_FLAG_FIT_VALID) ? &*model.contact()
-                                                                                                    : nullptr;
+  return model.is_current() && model.contact() && (model.contact()->flags & CONTACT_FLAG_FIT_VALID) ? &*model.contact() : nullptr;
 }
 
 float fitted_Pa(const wire_contact &contact, float x_mm, float y_mm) {
@@ -88,8 +84,7 @@ void paint_fit(Picture &picture, const Model &model, const wire_contact &contact
     float newest_us = static_cast<float>(model.trail().back().t_us);
     for (const Model::Location &past : model.trail()) {
       float age = (newest_us - static_cast<float>(past.t_us)) / 1e6f;
-      picture.paint(picture.column_of(past.x_mm), picture.pixel_row_of(past.y_mm), ACCENT,
-                    0.2f * std::round(4 * (1 - age)));
+      picture.paint(picture.column_of(past.x_mm), picture.pixel_row_of(past.y_mm), ACCENT, 0.2f * std::round(4 * (1 - age)));
     }
   }
 }
@@ -120,8 +115,7 @@ struct Arrow {
     if (has_direction() && ahead_mm >= 0 && ahead_mm <= length_mm - sd_mm && aside_mm <= 0.5f * pixel_mm) {
       return part;
     }
-    bool in_cone =
-        has_direction() && ahead_mm >= 0 && ahead_mm <= length_mm && aside_mm <= sd_mm * ahead_mm / length_mm;
+    bool in_cone = has_direction() && ahead_mm >= 0 && ahead_mm <= length_mm && aside_mm <= sd_mm * ahead_mm / length_mm;
     float from_end_mm = std::hypot(dx_mm - length_mm * along_x, dy_mm - length_mm * along_y);
     return in_cone || from_end_mm <= std::max(sd_mm, 0.5f * pixel_mm) ? UNSURE_PART * part : 0;
   }
@@ -150,8 +144,7 @@ void paint_edge(Picture &picture, const wire_contact &contact) {
   });
 }
 
-/* The cells of a location's mark: a cross; of a doubtful one a ring that is open on all sides. Two
- * contacts are two crosses. */
+/* The cells of a location's mark: a cross; of a doubtful one a ring that is open on all sides. Two contacts are two crosses. */
 struct Mark {
   struct Cell {
     int column, row;
@@ -253,8 +246,7 @@ void draw_sensor(Canvas &canvas, const Picture &picture, const Model &model, int
   if (has_room_for_fit && fit) {
     const Canvas::Cell &behind =
         canvas.cell(std::clamp(column + width / 2, 0, canvas.columns() - 1), std::clamp(row + 2, 0, canvas.rows() - 1));
-    put(2, kPa(fitted_Pa(*fit, info.x_mm[k], info.y_mm[k])), is_bright(behind.style.back) ? BLACK : ACCENT, false,
-        std::nullopt);
+    put(2, kPa(fitted_Pa(*fit, info.x_mm[k], info.y_mm[k])), is_bright(behind.style.back) ? BLACK : ACCENT, false, std::nullopt);
   }
 }
 
@@ -298,8 +290,7 @@ void draw_frame(Canvas &canvas, const Area &area, const Model &model) {
     std::string text = std::to_string(tick_kPa);
     float part = heat_part(static_cast<float>(tick_kPa) * 1000);
     auto length = static_cast<int>(text.size());
-    int at = std::min(left + static_cast<int>(std::lround(part * static_cast<float>(width - 1))) - length / 2,
-                      left + width - length);
+    int at = std::min(left + static_cast<int>(std::lround(part * static_cast<float>(width - 1))) - length / 2, left + width - length);
     if (at >= free_from) {
       Colour behind = heat(part);
       free_from = canvas.text(at, bottom, text, text_style(is_bright(behind) ? BLACK : WHITE)) + 1;
@@ -344,8 +335,8 @@ Area draw_pad(Canvas &canvas, const Area &available, const Model &model) {
     /* At the end, or as near to it as there is room, outside of the location's own cell. */
     bool placed = false;
     for (float mm = arrow->length_mm; !placed && mm > 2 * picture.pixel_mm(); mm -= picture.pixel_mm()) {
-      placed = place(picture.column_of(fit->x_mm + mm * arrow->along_x),
-                     picture.pixel_row_of(fit->y_mm + mm * arrow->along_y) / 2, arrow->head(), arrow->colour);
+      placed = place(picture.column_of(fit->x_mm + mm * arrow->along_x), picture.pixel_row_of(fit->y_mm + mm * arrow->along_y) / 2,
+                     arrow->head(), arrow->colour);
     }
   }
   if (fit) {

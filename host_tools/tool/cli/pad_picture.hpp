@@ -14,8 +14,7 @@ namespace fingertip {
 class PadScale {
 public:
   /* Of so many sensors, in at most so many cells. */
-  template <typename Number>
-  PadScale(const Number *x_mm, const Number *y_mm, std::size_t sensors, int columns, int rows) {
+  template <typename Number> PadScale(const Number *x_mm, const Number *y_mm, std::size_t sensors, int columns, int rows) {
     constexpr float rim_mm = 5;        /* beyond the outer sensors: half a pitch of 9 mm and some */
     constexpr float finest_mm = 0.75f; /* sensors 9 mm apart measure nothing that is finer */
     const auto [left, right] = std::minmax_element(x_mm, x_mm + sensors);
@@ -24,8 +23,8 @@ public:
     top_mm_ = static_cast<float>(*top) + rim_mm;
     const float width_mm = static_cast<float>(*right) + rim_mm - left_mm_;
     const float height_mm = top_mm_ - static_cast<float>(*bottom) + rim_mm;
-    pixel_mm_ = std::max({width_mm / static_cast<float>(std::max(columns, 4)),
-                          height_mm / static_cast<float>(2 * std::max(rows, 2)), finest_mm});
+    pixel_mm_ =
+        std::max({width_mm / static_cast<float>(std::max(columns, 4)), height_mm / static_cast<float>(2 * std::max(rows, 2)), finest_mm});
     columns_ = static_cast<int>(std::lround(width_mm / pixel_mm_));
     rows_ = static_cast<int>(std::lround(height_mm / pixel_mm_ / 2));
   }
@@ -42,8 +41,7 @@ private:
   int columns_, rows_;
 };
 
-/* In its frame, at the upper left corner of what is available; the area that it took. The model
- * must know its sensors. */
+/* In its frame, at the upper left corner of what is available; the area that it took. The model must know its sensors. */
 Area draw_pad(Canvas &canvas, const Area &available, const Model &model);
 
 } // namespace fingertip

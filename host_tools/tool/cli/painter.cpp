@@ -37,18 +37,16 @@ static bool is_braille(const std::string &character) {
 }
 
 static char ascii_of_braille(const std::string &character) {
-  unsigned dots =
-      (static_cast<unsigned char>(character[1]) & 3u) << 6 | (static_cast<unsigned char>(character[2]) & 0x3Fu);
+  unsigned dots = (static_cast<unsigned char>(character[1]) & 3u) << 6 | (static_cast<unsigned char>(character[2]) & 0x3Fu);
   constexpr unsigned upper = 0x1B, lower = 0xE4; /* two rows each */
   return dots & upper ? (dots & lower ? ':' : '\'') : dots & lower ? '.' : ' ';
 }
 
 static char ascii_of(const std::string &character) {
   static const std::map<std::string, char> nearest = {
-      {"─", '-'}, {"│", '|'}, {"┤", '|'}, {"╌", '-'}, {"┼", '+'}, {"╭", '+'},  {"╮", '+'},  {"╰", '+'}, {"╯", '+'},
-      {"●", '*'}, {"○", 'o'}, {"·", '.'}, {"×", 'x'}, {"σ", 's'}, {"µ", 'u'},  {"±", '~'},  {"≥", '>'}, {"←", '<'},
-      {"→", '>'}, {"↑", '^'}, {"↓", 'v'}, {"↗", '/'}, {"↙", '/'}, {"↖", '\\'}, {"↘", '\\'}, {"▏", ' '}, {"▎", ' '},
-      {"▍", ' '}, {"▌", '#'}, {"▋", '#'}, {"▊", '#'}, {"▉", '#'}, {"█", '#'}};
+      {"─", '-'}, {"│", '|'},  {"┤", '|'},  {"╌", '-'}, {"┼", '+'}, {"╭", '+'}, {"╮", '+'}, {"╰", '+'}, {"╯", '+'}, {"●", '*'}, {"○", 'o'},
+      {"·", '.'}, {"×", 'x'},  {"σ", 's'},  {"µ", 'u'}, {"±", '~'}, {"≥", '>'}, {"←", '<'}, {"→", '>'}, {"↑", '^'}, {"↓", 'v'}, {"↗", '/'},
+      {"↙", '/'}, {"↖", '\\'}, {"↘", '\\'}, {"▏", ' '}, {"▎", ' '}, {"▍", ' '}, {"▌", '#'}, {"▋", '#'}, {"▊", '#'}, {"▉", '#'}, {"█", '#'}};
   auto found = nearest.find(character);
   return found != nearest.end() ? found->second : is_braille(character) ? ascii_of_braille(character) : '?';
 }
@@ -68,8 +66,8 @@ static void append_colour(std::string &codes, int plane, std::int32_t colour, bo
   if (colour < 0) {
     codes += std::to_string(plane + 9);
   } else if (truecolour) {
-    codes += std::to_string(plane + 8) + ";2;" + std::to_string(colour >> 16) + ";" +
-             std::to_string(colour >> 8 & 0xFF) + ";" + std::to_string(colour & 0xFF);
+    codes += std::to_string(plane + 8) + ";2;" + std::to_string(colour >> 16) + ";" + std::to_string(colour >> 8 & 0xFF) + ";" +
+             std::to_string(colour & 0xFF);
   } else {
     codes += std::to_string(plane + 8) + ";5;" + std::to_string(colour);
   }
@@ -128,8 +126,7 @@ std::string Painter::paint(const Canvas &canvas) {
   if (all) {
     columns_ = canvas.columns();
     rows_ = canvas.rows();
-    shown_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_),
-                  {" ", TERMINALS_OWN, TERMINALS_OWN, false});
+    shown_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), {" ", TERMINALS_OWN, TERMINALS_OWN, false});
     out += "\x1b[2J";
   }
   Shown pen;
@@ -137,8 +134,7 @@ std::string Painter::paint(const Canvas &canvas) {
   for (int row = 0; row < rows_; row++) {
     for (int column = 0; column < columns_; column++) {
       Shown wanted = shown(canvas.cell(column, row));
-      Shown &there =
-          shown_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column)];
+      Shown &there = shown_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column)];
       if (wanted == there) {
         continue;
       }

@@ -14,14 +14,10 @@ std::string right_aligned(const std::string &text, int width) {
 StateText state_of(const Model &model, bool how_long) {
   auto silence_s = model.seconds_since_frame();
   switch (model.state()) {
-  case Model::State::connecting:
-    return {"waiting for an answer", WARNING};
-  case Model::State::gone:
-    return {GONE_ADVICE, BAD};
-  case Model::State::replay:
-    return {"replay", ACCENT, true};
-  case Model::State::live:
-    break;
+  case Model::State::connecting: return {"waiting for an answer", WARNING};
+  case Model::State::gone: return {GONE_ADVICE, BAD};
+  case Model::State::replay: return {"replay", ACCENT, true};
+  case Model::State::live: break;
   }
   if (model.is_without_sensors()) {
     return {"no sensor answers", BAD};
@@ -71,9 +67,7 @@ bool is_too_small(Canvas &canvas) {
   const bool small = canvas.columns() < least_columns || canvas.rows() < least_rows;
   auto size = [](int columns, int rows) { return std::to_string(columns) + "x" + std::to_string(rows); };
   if (small) {
-    canvas.text(0, 0,
-                "window too small: " + size(canvas.columns(), canvas.rows()) + ", needs " +
-                    size(least_columns, least_rows),
+    canvas.text(0, 0, "window too small: " + size(canvas.columns(), canvas.rows()) + ", needs " + size(least_columns, least_rows),
                 text_style(WARNING, true));
   }
   return small;

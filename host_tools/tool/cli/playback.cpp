@@ -69,15 +69,13 @@ template <typename Reader, typename Shown> void Track<Reader, Shown>::go_back(do
   if (time_us >= now_.last_us || marks_.empty()) {
     return;
   }
-  const auto mark = std::find_if(marks_.rbegin(), marks_.rend() - 1,
-                                 [&](const Mark &each) { return each.position.next_us <= time_us; });
+  const auto mark = std::find_if(marks_.rbegin(), marks_.rend() - 1, [&](const Mark &each) { return each.position.next_us <= time_us; });
   file_.go_to(mark->place);
   shown = mark->shown;
   now_ = mark->position;
 }
 
-Playback::Playback(const std::string &path, bool salvage, const std::string &device, double speed,
-                   const TimeSpan &interval)
+Playback::Playback(const std::string &path, bool salvage, const std::string &device, double speed, const TimeSpan &interval)
     : speed_(speed) {
   std::vector<std::string> devices = {device};
   if (device.empty()) {
@@ -115,8 +113,7 @@ void Playback::step(HostTime now) {
   if (grip_track_) {
     is_there_ = grip_track_->read_to(time_us_, PACKETS_AT_ONCE, grip_) && is_there_;
   }
-  if (const double next_us = due_us();
-      is_there_ && !paused_ && std::isfinite(next_us) && next_us > time_us_ + PAUSE_MOST_us) {
+  if (const double next_us = due_us(); is_there_ && !paused_ && std::isfinite(next_us) && next_us > time_us_ + PAUSE_MOST_us) {
     time_us_ = next_us;
   }
   if (is_there_ && std::isinf(time_us_)) {
@@ -149,9 +146,8 @@ HostTime Playback::next_step(HostTime now) const {
 }
 
 bool Playback::is_over() const {
-  return quit_ ||
-         (!paused_ && is_there_ && (!grip_track_ || grip_track_->is_ended()) &&
-          std::all_of(tracks_.begin(), tracks_.end(), [](const FingertipTrack &track) { return track.is_ended(); }));
+  return quit_ || (!paused_ && is_there_ && (!grip_track_ || grip_track_->is_ended()) &&
+                   std::all_of(tracks_.begin(), tracks_.end(), [](const FingertipTrack &track) { return track.is_ended(); }));
 }
 
 void Playback::seek(double time_us) {

@@ -62,10 +62,8 @@ using GripTrack = Track<GripRowReader, GripModel>;
 
 class Playback {
 public:
-  /* speed: times the recorded one; 0: as fast as it can be read. Of a joint recording without a
-   * device all of its fingertips. */
-  Playback(const std::string &path, bool salvage, const std::string &device, double speed,
-           const TimeSpan &interval = {});
+  /* speed: times the recorded one; 0: as fast as it can be read. Of a joint recording without a device all of its fingertips. */
+  Playback(const std::string &path, bool salvage, const std::string &device, double speed, const TimeSpan &interval = {});
 
   /* Goes on to where it should be now, or as far as it gets in a moment. */
   void step(HostTime now);

@@ -124,14 +124,12 @@ Characters screen_characters() {
       }
     }
   }
-  std::transform(charset.begin(), charset.end(), charset.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  std::transform(charset.begin(), charset.end(), charset.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   bool utf_8 = charset.find("utf-8") != std::string::npos || charset.find("utf8") != std::string::npos;
   return utf_8 ? Characters::utf_8 : Characters::ascii;
 }
 
-Screen::Screen(ColourDepth depth)
-    : has_input_(tcgetattr(STDIN_FILENO, &before_) == 0), painter_(depth, screen_characters()) {
+Screen::Screen(ColourDepth depth) : has_input_(tcgetattr(STDIN_FILENO, &before_) == 0), painter_(depth, screen_characters()) {
   handle(SIGTSTP, on_suspend);
   enter();
 }

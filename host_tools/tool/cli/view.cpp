@@ -101,8 +101,8 @@ std::string contact_text(const Model &model) {
   std::string text;
   if (contact.flags & CONTACT_FLAG_FIT_VALID) {
     bool least = contact.flags & CONTACT_FLAG_FORCE_LOWER_BOUND;
-    text = std::string(is_doubtful(contact) ? "  doubtful:" : "") + "  x " + number(contact.x_mm, 2) + " mm  y " +
-           number(contact.y_mm, 2) + " mm  force " + (least ? "at least " : "") + number(contact.force_N, 2) + " N";
+    text = std::string(is_doubtful(contact) ? "  doubtful:" : "") + "  x " + number(contact.x_mm, 2) + " mm  y " + number(contact.y_mm, 2) +
+           " mm  force " + (least ? "at least " : "") + number(contact.force_N, 2) + " N";
   }
   return text + "  " + flags_text(contact.flags);
 }
@@ -115,8 +115,7 @@ public:
     }
     for (const Model &model : models) {
       std::string name = models.size() < 2 ? "" : printable(name_of(model)) + "  ";
-      std::printf("%s%s%s%s\n", name.c_str(), status_line(model).c_str(), contact_text(model).c_str(),
-                  with_gap(caption.note).c_str());
+      std::printf("%s%s%s%s\n", name.c_str(), status_line(model).c_str(), contact_text(model).c_str(), with_gap(caption.note).c_str());
     }
     std::fflush(stdout);
   }
@@ -165,9 +164,8 @@ public:
     shown_ = true;
     std::string text = models.size() == 1 ? status_line(models[0]) : fixed(models[0].seconds(), 1) + " s";
     for (const Model &model : models) {
-      text += models.size() == 1 ? ""
-                                 : "  " + name_of(model) + " " + std::to_string(model.frames()) + " frames" +
-                                       with_gap(trouble_of(model));
+      text +=
+          models.size() == 1 ? "" : "  " + name_of(model) + " " + std::to_string(model.frames()) + " frames" + with_gap(trouble_of(model));
     }
     std::fprintf(stderr, in_place_ ? "\r\x1b[K%s" : "%s\n", printable(text + with_gap(caption.note)).c_str());
     std::fflush(stderr);
@@ -209,16 +207,14 @@ std::unique_ptr<View> make_monitor_view(ColourMode mode) {
 
 std::unique_ptr<View> make_grasp_view(ColourMode mode, const GripModel &grip) {
   if (auto depth = screen_depth(mode)) {
-    return std::make_unique<ScreenView>(*depth,
-                                        [&grip](const std::vector<Model> &models, const Caption &caption, int columns,
-                                                int rows) { return draw_grasp(models, grip, caption, columns, rows); });
+    return std::make_unique<ScreenView>(*depth, [&grip](const std::vector<Model> &models, const Caption &caption, int columns, int rows) {
+      return draw_grasp(models, grip, caption, columns, rows);
+    });
   }
   return std::make_unique<GraspLineView>(grip, false);
 }
 
-std::unique_ptr<View> make_quiet_grasp_view(const GripModel &grip) {
-  return std::make_unique<GraspLineView>(grip, true);
-}
+std::unique_ptr<View> make_quiet_grasp_view(const GripModel &grip) { return std::make_unique<GraspLineView>(grip, true); }
 
 std::unique_ptr<View> make_progress_view() { return std::make_unique<ProgressView>(); }
 
@@ -226,17 +222,16 @@ std::unique_ptr<View> make_state_view() { return std::make_unique<StateView>(); 
 
 std::string summary_text(const Model &model) {
   const LineStatistics &line = model.statistics();
-  return std::to_string(model.frames()) + " frames in " + fixed(model.seconds(), 2) + " s (" +
-         fixed(model.mean_frames_per_s(), 1) + "/s), " + std::to_string(line.dropped_packets) + " packets dropped, " +
-         std::to_string(line.crc_errors) + " CRC errors, " + std::to_string(line.format_errors) + " format errors" +
-         edges_text(model);
+  return std::to_string(model.frames()) + " frames in " + fixed(model.seconds(), 2) + " s (" + fixed(model.mean_frames_per_s(), 1) +
+         "/s), " + std::to_string(line.dropped_packets) + " packets dropped, " + std::to_string(line.crc_errors) + " CRC errors, " +
+         std::to_string(line.format_errors) + " format errors" + edges_text(model);
 }
 
 std::string edges_text(const Model &model) {
   const EdgeCounter &edges = model.edges();
-  return edges.edges() == 0 ? ""
-                            : ", " + std::to_string(edges.edges()) + " edges at the sync pin, " +
-                                  std::to_string(edges.missing()) + " missing";
+  return edges.edges() == 0
+             ? ""
+             : ", " + std::to_string(edges.edges()) + " edges at the sync pin, " + std::to_string(edges.missing()) + " missing";
 }
 
 } // namespace fingertip

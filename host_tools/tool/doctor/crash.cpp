@@ -31,8 +31,8 @@ static std::string exception_text(unsigned number) {
     return number == 3 ? "the fault handler" : "exception " + std::to_string(number);
   }
   /* RP2040 datasheet 2.3.2, and boards/rp2040/nvic.h for the last */
-  static constexpr std::pair<unsigned, const char *> names[] = {
-      {0, "sensors' timer"}, {1, "USB's timer"}, {5, "USB"}, {7, "PIO"}, {11, "DMA"}, {23, "I2C"}, {26, "USB service"}};
+  static constexpr std::pair<unsigned, const char *> names[] = {{0, "sensors' timer"}, {1, "USB's timer"}, {5, "USB"},         {7, "PIO"},
+                                                                {11, "DMA"},           {23, "I2C"},        {26, "USB service"}};
   std::string text = "interrupt " + std::to_string(number - FIRST_INTERRUPT);
   for (auto [interrupt, name] : names) {
     if (interrupt == number - FIRST_INTERRUPT) {
@@ -72,14 +72,12 @@ static std::string at_text(const Crash &crash) {
     return "";
   }
   bool is_call = record.kind != CRASH_PANIC && record.lr != 0 && record.lr < EXC_RETURN_MIN;
-  return " at " + place_text(record.pc, crash.place) +
-         (is_call ? ", called from " + place_text(record.lr & ~1u, crash.caller) : "");
+  return " at " + place_text(record.pc, crash.place) + (is_call ? ", called from " + place_text(record.lr & ~1u, crash.caller) : "");
 }
 
 static std::string where_text(const crash_record &record) {
-  return record.exception == 0
-             ? ", in the main loop, " + activity_text(record.activity)
-             : ", in " + exception_text(record.exception) + ", the main loop " + activity_text(record.activity);
+  return record.exception == 0 ? ", in the main loop, " + activity_text(record.activity)
+                               : ", in " + exception_text(record.exception) + ", the main loop " + activity_text(record.activity);
 }
 
 static std::string event_text(unsigned code, unsigned detail) {
@@ -103,25 +101,18 @@ std::string crash_text(const Crash &crash) {
   const crash_record &record = crash.record;
   std::string since = ", " + duration_text(static_cast<double>(record.t_us) / 1e6) + " after its start";
   switch (record.kind) {
-  case CRASH_FAULT:
-    return "a hard fault" + at_text(crash) + where_text(record) + since;
-  case CRASH_OVERFLOW:
-    return "the stack overflowed" + at_text(crash) + where_text(record) + since;
-  case CRASH_PANIC:
-    return "a panic" + at_text(crash) + where_text(record) + since;
-  case CRASH_EXCEPTION:
-    return exception_text(record.vector) + " came, which has no handler," + at_text(crash) + where_text(record) + since;
+  case CRASH_FAULT: return "a hard fault" + at_text(crash) + where_text(record) + since;
+  case CRASH_OVERFLOW: return "the stack overflowed" + at_text(crash) + where_text(record) + since;
+  case CRASH_PANIC: return "a panic" + at_text(crash) + where_text(record) + since;
+  case CRASH_EXCEPTION: return exception_text(record.vector) + " came, which has no handler," + at_text(crash) + where_text(record) + since;
   case CRASH_WATCHDOG:
     if (record.stuck & CRASH_STUCK_INTERRUPTS) {
-      return "the watchdog struck: nothing went on, interrupts neither, the main loop " +
-             activity_text(record.activity) + since;
+      return "the watchdog struck: nothing went on, interrupts neither, the main loop " + activity_text(record.activity) + since;
     }
-    return "the watchdog struck: " + stuck_text(record.stuck) + " made no progress; the processor was" +
-           at_text(crash) + where_text(record) + since;
-  case CRASH_START:
-    return "a start that gave up: clocks that did not come, or a fault in the start-up code";
-  default:
-    return "an end of kind " + std::to_string(record.kind) + ", which this tool does not know";
+    return "the watchdog struck: " + stuck_text(record.stuck) + " made no progress; the processor was" + at_text(crash) +
+           where_text(record) + since;
+  case CRASH_START: return "a start that gave up: clocks that did not come, or a fault in the start-up code";
+  default: return "an end of kind " + std::to_string(record.kind) + ", which this tool does not know";
   }
 }
 

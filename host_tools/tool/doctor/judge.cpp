@@ -23,8 +23,7 @@ namespace {
 constexpr double RATE_SHARE_MIN = 0.97;
 /* No disturbance that the firmware mends by itself costs a quarter. */
 constexpr double RATE_SHARE_BAD = 0.75;
-/* Share of frames without a sensor's reading: a NACK a second leaves 1 % of 186 frames a second
- * incomplete (firmware/scan/scan.h). */
+/* Share of frames without a sensor's reading: a NACK a second leaves 1 % of 186 frames a second incomplete (firmware/scan/scan.h). */
 constexpr double ABSENT_SHARE_MAX = 0.01;
 constexpr double DOUBTFUL_SHARE_MAX = 0.01;
 /* Times the data sheet's typical noise. An estimate from 20 steps has a standard deviation of 0.2:
@@ -37,7 +36,7 @@ constexpr double DRIFT_SURE_sd = 3;
 /* Each temperature moves a sensor's pressures until the next one comes, 2 s later at most (scan.h),
  * by its noise: 240 Pa/degC (readings.h), and rms of the data sheet by OSR. */
 constexpr double TEMPERATURE_Pa_per_degC = 240, TEMPERATURE_INTERVAL_MAX_s = 2;
-#define ROW(ratio, bits, max_us, noise_Pa, noise_degC)                                                                 \
+#define ROW(ratio, bits, max_us, noise_Pa, noise_degC)                                                                                     \
   { ratio, noise_degC }
 constexpr std::pair<unsigned, double> TEMPERATURE_NOISE_degC[] = {MS58XX_OSR_TABLE(ROW)};
 #undef ROW
@@ -50,8 +49,7 @@ constexpr unsigned STACK_FREE_MIN_bytes = FT_STACK_RESERVED_bytes - FT_STACK_USE
 constexpr unsigned BUSY_MAX_permille = 950;
 
 std::string list(const std::vector<unsigned> &sensors) {
-  return (sensors.size() == 1 ? "sensor " : "sensors ") +
-         joined(sensors, ", ", [](unsigned sensor) { return std::to_string(sensor); });
+  return (sensors.size() == 1 ? "sensor " : "sensors ") + joined(sensors, ", ", [](unsigned sensor) { return std::to_string(sensor); });
 }
 
 std::vector<unsigned> sensors_in(std::uint32_t bitmap) {
@@ -66,9 +64,7 @@ std::vector<unsigned> sensors_in(std::uint32_t bitmap) {
 
 std::string percent(double share) { return fixed(100 * share, share < 0.1 ? 1 : 0) + " %"; }
 
-std::string count(std::uint64_t number, const std::string &what) {
-  return std::to_string(number) + " " + what + (number == 1 ? "" : "s");
-}
+std::string count(std::uint64_t number, const std::string &what) { return std::to_string(number) + " " + what + (number == 1 ? "" : "s"); }
 
 constexpr unsigned SYNC_IN = 1; /* of info's field sync: others send the edges */
 
@@ -127,8 +123,7 @@ private:
   }
 
   std::string check_of(unsigned sensor) const {
-    return wiring_ && sensor < wiring_->sensor_count ? wiring_->check_sensor(sensor)
-                                                     : "check its supply, data line and clock";
+    return wiring_ && sensor < wiring_->sensor_count ? wiring_->check_sensor(sensor) : "check its supply, data line and clock";
   }
 
   void rule() {
@@ -142,9 +137,8 @@ private:
   }
 
   std::string holders_text() const {
-    return joined(facts_.holders.seen, ", ", [](const Holder &holder) {
-      return holder.name + " (process " + std::to_string(holder.process) + ")";
-    });
+    return joined(facts_.holders.seen, ", ",
+                  [](const Holder &holder) { return holder.name + " (process " + std::to_string(holder.process) + ")"; });
   }
 
   void port() {
@@ -180,8 +174,7 @@ private:
       add(Verdict::ok, "port", facts_.port);
       add(Verdict::bad, "protocol", failure.text, advice(failure.code));
       break;
-    default:
-      add(Verdict::bad, "port", failure.text, advice(failure.code));
+    default: add(Verdict::bad, "port", failure.text, advice(failure.code));
     }
   }
 
@@ -191,8 +184,8 @@ private:
     auto version = [](const auto &parts) {
       return std::to_string(parts[0]) + "." + std::to_string(parts[1]) + "." + std::to_string(parts[2]);
     };
-    std::string text = version(info.firmware_version) + " (" + text_field(info.git_hash) + "), board " +
-                       text_field(info.board) + ", scene " + text_field(info.scene);
+    std::string text = version(info.firmware_version) + " (" + text_field(info.git_hash) + "), board " + text_field(info.board) +
+                       ", scene " + text_field(info.scene);
     if (std::equal(facts_.tool_version.begin(), facts_.tool_version.end(), info.firmware_version)) {
       add(Verdict::ok, "firmware", text);
     } else {
@@ -200,8 +193,7 @@ private:
           "install this tool's with `fingertip flash`, or use the other's tool");
     }
     if (!wiring_ || wiring_->sensor_count != info.sensor_count) {
-      add(Verdict::warn, "board",
-          text_field(info.board) + " with " + count(info.sensor_count, "sensor") + " is unknown to this tool",
+      add(Verdict::warn, "board", text_field(info.board) + " with " + count(info.sensor_count, "sensor") + " is unknown to this tool",
           "pins and the rate to expect are those of its own documents");
       wiring_.reset();
     }
@@ -210,8 +202,7 @@ private:
   void stored() {
     std::uint32_t stored = facts_.info->stored;
     if (stored & WIRE_STORED_DAMAGED) {
-      add(Verdict::bad, "stored", "what it had stored cannot be read and is not used",
-          "calibrate again, or set --keep");
+      add(Verdict::bad, "stored", "what it had stored cannot be read and is not used", "calibrate again, or set --keep");
     } else {
       add(Verdict::ok, "stored",
           std::string(stored & WIRE_STORED_CALIBRATION ? "a calibration" : "no calibration") +
@@ -260,8 +251,7 @@ private:
     missing_sensors();
     if (facts_.rest && are_of_another_type()) {
       add(Verdict::bad, "sensors",
-          "they read " + fixed(middle_Pa() / 1000, 0) +
-              " kPa at rest, as sensors do that are not those of the firmware",
+          "they read " + fixed(middle_Pa() / 1000, 0) + " kPa at rest, as sensors do that are not those of the firmware",
           "install firmware that was built for them (cmake -DFINGERTIP_SENSOR=...), or the sensors that this one is "
           "for");
     } else if (facts_.rest) {
@@ -279,12 +269,10 @@ private:
   void doubtful_sensor(unsigned k, const SensorAtRest &sensor) {
     bool memory_bad = facts_.after->sensors_prom_bad >> k & 1u;
     if (sensor.valid_share < 1 - ABSENT_SHARE_MAX && !memory_bad) {
-      add(Verdict::warn, "sensors",
-          named(k) + " has readings in " + percent(sensor.valid_share) + " of the frames only", check_of(k), {k});
+      add(Verdict::warn, "sensors", named(k) + " has readings in " + percent(sensor.valid_share) + " of the frames only", check_of(k), {k});
     }
     if (sensor.saturated_share > 0) {
-      add(Verdict::warn, "sensors", named(k) + " reads beyond its range, 1980 mbar",
-          "release the pad; if it stays, replace it", {k});
+      add(Verdict::warn, "sensors", named(k) + " reads beyond its range, 1980 mbar", "release the pad; if it stays, replace it", {k});
     } else if (sensor.doubtful_share > DOUBTFUL_SHARE_MAX && !memory_bad) {
       add(Verdict::warn, "sensors",
           named(k) + " differs from the others: its pressure at rest, or a temperature that fits neither its own "
@@ -338,15 +326,13 @@ private:
     std::uint32_t recoveries = now.bus_recoveries - then.bus_recoveries;
     std::uint32_t odd = now.implausible_readings - then.implausible_readings + now.zero_readings - then.zero_readings;
     std::string text = fixed(nacks / seconds(), 1) + " NACKs/s, " + std::to_string(recoveries) +
-                       (recoveries == 1 ? " recovery, " : " recoveries, ") + count(timeouts, "timeout") + ", " +
-                       count(odd, "reading") + " left out";
+                       (recoveries == 1 ? " recovery, " : " recoveries, ") + count(timeouts, "timeout") + ", " + count(odd, "reading") +
+                       " left out";
     if (nacks + timeouts + recoveries + odd == 0) {
-      add(Verdict::ok, "bus",
-          text + "; since its start " + count(now.bus_nacks, "NACK") + " and " + count(now.bus_timeouts, "timeout"));
+      add(Verdict::ok, "bus", text + "; since its start " + count(now.bus_nacks, "NACK") + " and " + count(now.bus_timeouts, "timeout"));
     } else {
       add(Verdict::warn, "bus", text,
-          missing_ ? "see to the missing sensors first"
-                   : "check wires, pull-ups and supply; keep motor cables away from them");
+          missing_ ? "see to the missing sensors first" : "check wires, pull-ups and supply; keep motor cables away from them");
     }
   }
 
@@ -356,10 +342,8 @@ private:
     if (facts_.before && now.uptime_s < facts_.before->uptime_s) {
       add(Verdict::bad, "restarts", "it restarted while it was examined", "check its supply");
     } else if (now.watchdog_resets) {
-      add(Verdict::warn, "restarts",
-          up + ", " + count(now.watchdog_resets, "reset") + " by the watchdog since power-on",
-          facts_.crash ? "see the crash below"
-                       : "if it does so again, check its supply and report it with the firmware's version");
+      add(Verdict::warn, "restarts", up + ", " + count(now.watchdog_resets, "reset") + " by the watchdog since power-on",
+          facts_.crash ? "see the crash below" : "if it does so again, check its supply and report it with the firmware's version");
     } else {
       add(Verdict::ok, "restarts", up + ", started by power or command");
     }
@@ -369,9 +353,9 @@ private:
   void crash() {
     const Crash &crash = *facts_.crash;
     const std::string events = events_text(crash.record);
-    const std::string text = joined(std::vector{crash_text(crash), events.empty() ? "" : "before that: " + events,
-                                                registers_text(crash.record), crash.symbols_note},
-                                    "; ");
+    const std::string text = joined(
+        std::vector{crash_text(crash), events.empty() ? "" : "before that: " + events, registers_text(crash.record), crash.symbols_note},
+        "; ");
     bool is_start = crash.record.kind == CRASH_START;
     add(is_start ? Verdict::warn : Verdict::bad, "crash", text,
         is_start ? "check its supply; if it stays, the board's crystal"
@@ -402,8 +386,7 @@ private:
     const Rest &rest = *facts_.rest;
     const wire_info &info = *facts_.info;
     if (rest.frames_made == 0) {
-      add(Verdict::bad, "rate", "no frames came",
-          missing_ == all_ ? "see to the sensors first" : "unplug it and plug it in again");
+      add(Verdict::bad, "rate", "no frames came", missing_ == all_ ? "see to the sensors first" : "unplug it and plug it in again");
       return;
     }
     double rate_Hz = rest.frames_made / seconds();
@@ -414,8 +397,8 @@ private:
       return;
     }
     text += ", " + fixed(*expected_Hz, 1) + " expected (" +
-            (info.rate_mHz ? fixed(info.rate_mHz / 1000.0, 1) + " asked for" : "as fast as it can") + ", OSR " +
-            std::to_string(info.osr) + ")";
+            (info.rate_mHz ? fixed(info.rate_mHz / 1000.0, 1) + " asked for" : "as fast as it can") + ", OSR " + std::to_string(info.osr) +
+            ")";
     double share = rate_Hz / *expected_Hz;
     Verdict verdict = share < RATE_SHARE_BAD ? Verdict::bad : share < RATE_SHARE_MIN ? Verdict::warn : Verdict::ok;
     add(verdict, "rate", text,
@@ -427,10 +410,9 @@ private:
   void packets() {
     const LineStatistics &line = facts_.line;
     std::uint64_t damaged = line.crc_errors + line.format_errors;
-    std::uint32_t dropped =
-        facts_.before && facts_.after ? facts_.after->packets_dropped - facts_.before->packets_dropped : 0;
-    std::string text = count(line.packets, "packet") + ", " + std::to_string(line.dropped_packets) + " lost, " +
-                       std::to_string(damaged) + " damaged";
+    std::uint32_t dropped = facts_.before && facts_.after ? facts_.after->packets_dropped - facts_.before->packets_dropped : 0;
+    std::string text =
+        count(line.packets, "packet") + ", " + std::to_string(line.dropped_packets) + " lost, " + std::to_string(damaged) + " damaged";
     const bool ok = line.dropped_packets + damaged == 0;
     text += !ok && dropped > 0 ? ", " + std::to_string(dropped) + " of them dropped by the fingertip" : "";
     add(ok ? Verdict::ok : Verdict::warn, "packets", text,
@@ -464,11 +446,9 @@ private:
     bool noisy = false;
     if (rest.sensors.empty() || readings <= STEPS_MIN) {
       add(Verdict::warn, "noise",
-          rest.sensors.empty() ? "not measured: no readings came"
-                               : "not measured: " + count(readings, "reading") + " are too few",
-          !(facts_.info->capabilities & WIRE_CAPABILITY_RAW_STREAM)
-              ? "this firmware streams none; use scene grasp or raw"
-              : "measure longer, with --seconds");
+          rest.sensors.empty() ? "not measured: no readings came" : "not measured: " + count(readings, "reading") + " are too few",
+          !(facts_.info->capabilities & WIRE_CAPABILITY_RAW_STREAM) ? "this firmware streams none; use scene grasp or raw"
+                                                                    : "measure longer, with --seconds");
     } else {
       noisy = noise();
     }
@@ -525,8 +505,7 @@ private:
     } else if (!(rest.last_flags & CONTACT_FLAG_TARED)) {
       add(Verdict::warn, "zero", "not every sensor has one", "let go of the pad, then `fingertip tare`");
     } else if (rest.last_flags & CONTACT_FLAG_ZERO_DOUBTFUL) {
-      add(Verdict::warn, "zero", "the pressure may be a zero that has moved",
-          "`fingertip tare` where nothing touches the pad");
+      add(Verdict::warn, "zero", "the pressure may be a zero that has moved", "`fingertip tare` where nothing touches the pad");
     } else {
       add(Verdict::ok, "zero", "tared, and nothing touches the pad");
     }
@@ -536,8 +515,7 @@ private:
   double temperature_sd_Pa_per_s() const {
     for (auto [osr, noise_degC] : TEMPERATURE_NOISE_degC) {
       if (osr == facts_.info->osr) {
-        return TEMPERATURE_Pa_per_degC * noise_degC * std::sqrt(12 * TEMPERATURE_INTERVAL_MAX_s / seconds()) /
-               seconds();
+        return TEMPERATURE_Pa_per_degC * noise_degC * std::sqrt(12 * TEMPERATURE_INTERVAL_MAX_s / seconds()) / seconds();
       }
     }
     return 0;
@@ -571,13 +549,11 @@ private:
     }
     if (rest.common_drift && is_steep(*rest.common_drift)) {
       any = true;
-      add(Verdict::warn, "drift",
-          "all sensors together drift by " + fixed(rest.common_drift->Pa_per_s, 1) + " Pa/s" + followed,
+      add(Verdict::warn, "drift", "all sensors together drift by " + fixed(rest.common_drift->Pa_per_s, 1) + " Pa/s" + followed,
           "let it warm up for some minutes; the air of the room may move too");
     }
     if (!any) {
-      add(Verdict::ok, "drift",
-          "at most " + fixed(most_Pa_per_s, 2) + " Pa/s, known to " + fixed(temperature_sd_Pa_per_s(), 2) + followed);
+      add(Verdict::ok, "drift", "at most " + fixed(most_Pa_per_s, 2) + " Pa/s, known to " + fixed(temperature_sd_Pa_per_s(), 2) + followed);
     }
   }
 
@@ -599,9 +575,7 @@ Verdict worst_of(const std::vector<Finding> &findings) {
   return worst;
 }
 
-std::string verdict_text(Verdict verdict) {
-  return verdict == Verdict::ok ? "ok" : verdict == Verdict::warn ? "warn" : "bad";
-}
+std::string verdict_text(Verdict verdict) { return verdict == Verdict::ok ? "ok" : verdict == Verdict::warn ? "warn" : "bad"; }
 
 std::optional<double> expected_rate_Hz(const wire_info &info) {
   double asked_Hz = info.rate_mHz / 1000.0;

@@ -113,8 +113,7 @@ std::optional<double> RestMeter::noise(unsigned sensor, const std::vector<double
   double squares = 0;
   for (std::size_t i = 1; i < readings_.size(); i++) {
     if (has(readings_[i].valid & readings_[i - 1].valid, sensor)) {
-      double step_Pa = static_cast<double>(readings_[i].pressure_Pa[sensor] - readings_[i - 1].pressure_Pa[sensor]) -
-                       together[i - 1];
+      double step_Pa = static_cast<double>(readings_[i].pressure_Pa[sensor] - readings_[i - 1].pressure_Pa[sensor]) - together[i - 1];
       steps_Pa.push_back(std::abs(step_Pa));
       squares += step_Pa * step_Pa;
     }

@@ -1,9 +1,8 @@
 /* What a fingertip does while nothing touches it: its rate, and the noise and drift of each sensor.
  *
- * Noise is that between one reading and the next, less what all sensors do together, for doors and
- * lifts move the air; the root of half the mean square or, in a measurement that was touched, where
- * a press would count, 1.05 times the median. Drift is the slope of ten means, less what all
- * sensors do together; its standard deviation is what the means scatter about the line. */
+ * Noise is that between one reading and the next, less what all sensors do together, for doors and lifts move the air; the root of half the
+ * mean square or, in a measurement that was touched, where a press would count, 1.05 times the median. Drift is the slope of ten means,
+ * less what all sensors do together; its standard deviation is what the means scatter about the line. */
 #pragma once
 
 #include "libfingertip/edge_counter.hpp"

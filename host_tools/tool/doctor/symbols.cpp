@@ -16,8 +16,7 @@ namespace fingertip {
 /* An assembler's label without a size reaches to the next function, but no farther than this. */
 constexpr std::uint32_t UNSIZED_MAX_bytes = 4096;
 
-template <typename Part>
-static Part part_at(const std::vector<std::uint8_t> &file, std::size_t at, const std::string &name) {
+template <typename Part> static Part part_at(const std::vector<std::uint8_t> &file, std::size_t at, const std::string &name) {
   Part part;
   if (at > file.size() || file.size() - at < sizeof part) {
     throw Error(name + ": is cut short; give the ELF file of this firmware");
@@ -39,15 +38,13 @@ Symbols Symbols::of_file(const std::string &path) {
 }
 
 Symbols::Symbols(std::vector<std::uint8_t> file, const std::string &name) : file_(std::move(file)) {
-  bool is_elf = file_.size() > EI_DATA && std::memcmp(file_.data(), ELFMAG, SELFMAG) == 0 &&
-                file_[EI_CLASS] == ELFCLASS32 && file_[EI_DATA] == ELFDATA2LSB;
+  bool is_elf = file_.size() > EI_DATA && std::memcmp(file_.data(), ELFMAG, SELFMAG) == 0 && file_[EI_CLASS] == ELFCLASS32 &&
+                file_[EI_DATA] == ELFDATA2LSB;
   if (!is_elf || part_at<Elf32_Ehdr>(file_, 0, name).e_machine != EM_ARM) {
     throw Error(name + ": no ELF file of a fingertip; give fingertip-BOARD.elf");
   }
   auto header = part_at<Elf32_Ehdr>(file_, 0, name);
-  auto section = [&](std::size_t i) {
-    return part_at<Elf32_Shdr>(file_, header.e_shoff + i * sizeof(Elf32_Shdr), name);
-  };
+  auto section = [&](std::size_t i) { return part_at<Elf32_Shdr>(file_, header.e_shoff + i * sizeof(Elf32_Shdr), name); };
   for (unsigned i = 0; i < header.e_shnum; i++) {
     Elf32_Shdr table = section(i);
     if (table.sh_type != SHT_SYMTAB || table.sh_link >= header.e_shnum) {

@@ -14,15 +14,15 @@ namespace fingertip {
 namespace fs = std::filesystem;
 
 /* udev(7), and where a local cmake --install puts it. */
-constexpr const char *RULE_FOLDERS[] = {"etc/udev/rules.d", "run/udev/rules.d", "usr/local/lib/udev/rules.d",
-                                        "usr/lib/udev/rules.d", "lib/udev/rules.d"};
+constexpr const char *RULE_FOLDERS[] = {"etc/udev/rules.d", "run/udev/rules.d", "usr/local/lib/udev/rules.d", "usr/lib/udev/rules.d",
+                                        "lib/udev/rules.d"};
 
 static bool is_of_our_ports(const std::string &line) {
   char vendor[32], product[32];
   std::snprintf(vendor, sizeof vendor, "{idVendor}==\"%04x\"", FINGERTIP_USB_VID);
   std::snprintf(product, sizeof product, "{idProduct}==\"%04x\"", FINGERTIP_USB_PID);
-  return trim(line).substr(0, 1) != "#" && line.find("SUBSYSTEM==\"tty\"") != std::string::npos &&
-         line.find(vendor) != std::string::npos && line.find(product) != std::string::npos;
+  return trim(line).substr(0, 1) != "#" && line.find("SUBSYSTEM==\"tty\"") != std::string::npos && line.find(vendor) != std::string::npos &&
+         line.find(product) != std::string::npos;
 }
 
 static bool holds(const fs::path &descriptors, dev_t device, bool *readable) {
@@ -63,8 +63,7 @@ Holders holders_of(const std::string &device, const std::string &root) {
   for (const auto &process : fs::directory_iterator(fs::path(root) / "proc", none)) {
     auto number = to_u64(process.path().filename().string());
     bool readable = true;
-    if (number && *number != static_cast<std::uint64_t>(getpid()) &&
-        holds(process.path() / "fd", status.st_rdev, &readable)) {
+    if (number && *number != static_cast<std::uint64_t>(getpid()) && holds(process.path() / "fd", status.st_rdev, &readable)) {
       std::ifstream file(process.path() / "comm");
       std::string name;
       std::getline(file, name);
@@ -72,8 +71,7 @@ Holders holders_of(const std::string &device, const std::string &root) {
     }
     holders.all_seen = holders.all_seen && readable;
   }
-  std::sort(holders.seen.begin(), holders.seen.end(),
-            [](const Holder &a, const Holder &b) { return a.process < b.process; });
+  std::sort(holders.seen.begin(), holders.seen.end(), [](const Holder &a, const Holder &b) { return a.process < b.process; });
   return holders;
 }
 

@@ -41,16 +41,13 @@ Place Wiring::place(unsigned sensor) const {
   return place;
 }
 
-std::uint32_t Wiring::sensors_of(unsigned strip) const {
-  return ((1u << sensors_of_strip) - 1u) << (strip * sensors_of_strip);
-}
+std::uint32_t Wiring::sensors_of(unsigned strip) const { return ((1u << sensors_of_strip) - 1u) << (strip * sensors_of_strip); }
 
 std::string Wiring::place_text(unsigned sensor) const {
   Place at = place(sensor);
   std::string text = "strip " + std::to_string(at.strip) + ", ";
-  return at.multiplexer
-             ? text + "channel " + std::to_string(at.position) + " of multiplexer " + address_text(*at.multiplexer)
-             : text + "position " + std::to_string(at.position) + ", SDA on " + pin_text(*at.gpio);
+  return at.multiplexer ? text + "channel " + std::to_string(at.position) + " of multiplexer " + address_text(*at.multiplexer)
+                        : text + "position " + std::to_string(at.position) + ", SDA on " + pin_text(*at.gpio);
 }
 
 std::string Wiring::check_sensor(unsigned sensor) const {
@@ -71,8 +68,7 @@ std::string Wiring::check_multiplexer(unsigned strip) const {
 
 std::string Wiring::check_all() const {
   return "check 3V3 and GND of the sensors" + std::string(pin_sda ? " and multiplexers" : "") +
-         (pin_sda ? ", SDA on " + pin_text(*pin_sda) : "") + ", SCL on " + pin_text(pin_scl) +
-         ", and the pull-ups: 3.3 V at rest";
+         (pin_sda ? ", SDA on " + pin_text(*pin_sda) : "") + ", SCL on " + pin_text(pin_scl) + ", and the pull-ups: 3.3 V at rest";
 }
 
 } // namespace fingertip

@@ -91,8 +91,8 @@ bool HttpRequest::is_of_this_user() const {
     std::ifstream lines(table);
     for (std::string line; std::getline(lines, line);) {
       unsigned local = 0, remote = 0, state = 0, user = 0;
-      if (std::sscanf(line.c_str(), "%*s %*[^:]:%x %*[^:]:%x %x %*s %*s %*s %u", &local, &remote, &state, &user) == 4 &&
-          local == theirs && remote == ours) {
+      if (std::sscanf(line.c_str(), "%*s %*[^:]:%x %*[^:]:%x %x %*s %*s %*s %u", &local, &remote, &state, &user) == 4 && local == theirs &&
+          remote == ours) {
         found = true;
         if (state != ESTABLISHED || (user != geteuid() && user != 0)) {
           return false;
@@ -199,10 +199,9 @@ private:
   bool reply(HttpAnswer answer, const std::string &headers, bool only_head, bool ends) {
     ends = ends || answer.stream;
     const std::size_t length = answer.file ? answer.file->size() : answer.text.size();
-    out_ = "HTTP/1.1 " + std::to_string(answer.status) + " \r\n" + headers + answer.header +
-           "Content-Type: " + answer.type + "\r\n" +
-           (answer.stream ? "" : "Content-Length: " + std::to_string(length) + "\r\n") +
-           (ends ? "Connection: close\r\n\r\n" : "\r\n") + (only_head || answer.file ? "" : answer.text);
+    out_ = "HTTP/1.1 " + std::to_string(answer.status) + " \r\n" + headers + answer.header + "Content-Type: " + answer.type + "\r\n" +
+           (answer.stream ? "" : "Content-Length: " + std::to_string(length) + "\r\n") + (ends ? "Connection: close\r\n\r\n" : "\r\n") +
+           (only_head || answer.file ? "" : answer.text);
     file_ = only_head ? nullptr : answer.file;
     stream_ = only_head ? nullptr : std::move(answer.stream);
     ends_ = ends && !stream_;
@@ -281,8 +280,7 @@ void HttpServer::accept_all() {
     char peer[NI_MAXHOST] = "";
     getnameinfo(reinterpret_cast<const sockaddr *>(&address), length, peer, sizeof peer, nullptr, 0, NI_NUMERICHOST);
     const auto of_peer = [&](const Connection &each) { return each.peer() == peer; };
-    const bool too_many =
-        std::count_if(connections_.begin(), connections_.end(), of_peer) >= static_cast<std::ptrdiff_t>(MOST_OF_A_PEER);
+    const bool too_many = std::count_if(connections_.begin(), connections_.end(), of_peer) >= static_cast<std::ptrdiff_t>(MOST_OF_A_PEER);
     if (too_many || connections_.size() >= MOST_CONNECTIONS) {
       const auto oldest = std::max_element(connections_.begin(), connections_.end(), [&](const auto &a, const auto &b) {
         const auto rank = [&](const Connection &one) { return too_many && !of_peer(one) ? 0 : one.is_replaced(); };

@@ -5,9 +5,8 @@
  *                  the oldest that waits for a request, else for an answer, so that silent ones keep no one out
  *   an answer      as long as its reader takes something within 60 s; within 10 s of one without end (Stream)
  *
- * Memory: at most MOST_CONNECTIONS * (HEAD_BYTES + BODY_BYTES) = 21 MB, files apart, which are sent from where they
- * are. A fault of a request is answered (400, 411, 413, 431, 505) and its connection ends. An exception of the handler
- * is answered (500) and printed. */
+ * Memory: at most MOST_CONNECTIONS * (HEAD_BYTES + BODY_BYTES) = 21 MB, files apart, which are sent from where they are. A fault of a
+ * request is answered (400, 411, 413, 431, 505) and its connection ends. An exception of the handler is answered (500) and printed. */
 #pragma once
 
 #include "libfingertip/clock.hpp"

@@ -16,10 +16,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char *POLICY =
-    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' "
-    "data: blob:; font-src 'self'; connect-src 'self'; worker-src 'self'; manifest-src 'self'; "
-    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+constexpr const char *POLICY = "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; img-src 'self' "
+                               "data: blob:; font-src 'self'; connect-src 'self'; worker-src 'self'; manifest-src 'self'; "
+                               "base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 const std::string HEADERS = std::string("Content-Security-Policy: ") + POLICY +
                             "\r\n"
@@ -35,9 +34,8 @@ enum { MISDIRECTED_REQUEST = 421, FORBIDDEN = 403, METHOD_NOT_ALLOWED = 405, NOT
 
 std::string type_of(const fs::path &file) {
   static const std::map<std::string, std::string> types{
-      {".html", "text/html; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"},
-      {".css", "text/css; charset=utf-8"},   {".wasm", "application/wasm"},
-      {".txt", "text/plain; charset=utf-8"},
+      {".html", "text/html; charset=utf-8"}, {".js", "text/javascript; charset=utf-8"}, {".css", "text/css; charset=utf-8"},
+      {".wasm", "application/wasm"},         {".txt", "text/plain; charset=utf-8"},
   };
   auto found = types.find(file.extension().string());
   return found == types.end() ? "application/octet-stream" : found->second;
@@ -86,10 +84,8 @@ std::string why_not(const std::string &address, unsigned port, int error) {
   case EADDRINUSE:
     return place + " is taken by another program; end that one, or choose another --port (a browser asks "
                    "for fingertips again there)";
-  case EACCES:
-    return place + " needs privileges; choose another --port, from 1024 on";
-  default:
-    return place + " cannot be had (" + std::generic_category().message(error) + "); is it an address of this machine?";
+  case EACCES: return place + " needs privileges; choose another --port, from 1024 on";
+  default: return place + " cannot be had (" + std::generic_category().message(error) + "); is it an address of this machine?";
   }
 }
 
@@ -98,8 +94,7 @@ std::string why_not(const std::string &address, unsigned port, int error) {
 bool is_loopback(const std::string &address) {
   in_addr four{};
   in6_addr six{};
-  return address == "localhost" ||
-         (inet_pton(AF_INET, address.c_str(), &four) == 1 && ntohl(four.s_addr) >> 24 == 127) ||
+  return address == "localhost" || (inet_pton(AF_INET, address.c_str(), &four) == 1 && ntohl(four.s_addr) >> 24 == 127) ||
          (inet_pton(AF_INET6, address.c_str(), &six) == 1 && IN6_IS_ADDR_LOOPBACK(&six));
 }
 
@@ -107,8 +102,7 @@ PageServer::PageServer(const fs::path &folder, const std::string &address, unsig
   std::error_code failed;
   for (fs::recursive_directory_iterator entry(folder, failed), end; !failed && entry != end; entry.increment(failed)) {
     if (entry->is_regular_file()) {
-      files_["/" + entry->path().lexically_relative(folder).generic_string()] = {type_of(entry->path()),
-                                                                                 content(entry->path())};
+      files_["/" + entry->path().lexically_relative(folder).generic_string()] = {type_of(entry->path()), content(entry->path())};
     }
   }
   if (failed) {

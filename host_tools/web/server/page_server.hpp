@@ -1,7 +1,6 @@
-/* Serves the built page to browsers, and to those of this machine its simulated fingertips
- * (simulations.hpp). Nothing else: the page's files are read once, a name is searched among them
- * and never becomes a path. The page may load nothing from elsewhere (Content-Security-Policy), no
- * other site may embed or read it, and it is given only to who asks for it by an address or as
+/* Serves the built page to browsers, and to those of this machine its simulated fingertips (simulations.hpp). Nothing else: the page's
+ * files are read once, a name is searched among them and never becomes a path. The page may load nothing from elsewhere
+ * (Content-Security-Policy), no other site may embed or read it, and it is given only to who asks for it by an address or as
  * localhost: a name of the asker's own that leads here (DNS rebinding) is refused with 421.
  *
  * Everyone on this machine may read the page. Simulated fingertips are given to who has the token, which each server

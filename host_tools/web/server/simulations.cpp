@@ -73,8 +73,7 @@ std::optional<std::string> command_of(const std::string &body, const std::string
 /* A client's line, and its hand. */
 class Simulations::Session {
 public:
-  Session(const Simulated &one)
-      : side_(one.side), line_(one.socket), truth_(connect_unix(simulated_folder() + "/truth")) {}
+  Session(const Simulated &one) : side_(one.side), line_(one.socket), truth_(connect_unix(simulated_folder() + "/truth")) {}
   ~Session() { close(truth_); }
 
   std::vector<pollfd> poll_descriptors() const { return line_.poll_descriptors(); }
@@ -86,9 +85,7 @@ public:
     bytes->append(reinterpret_cast<const char *>(some), length);
     return result != Transport::Result::gone;
   }
-  bool send(const std::string &bytes) {
-    return line_.write(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size());
-  }
+  bool send(const std::string &bytes) { return line_.write(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size()); }
   const std::string &side() const { return side_; }
   /* What is true now (simulation/cell/hand_server.hpp), as JSON; or why the command cannot be. */
   std::string send_to_hand(const std::string &command, std::string *why_not) {
@@ -120,11 +117,9 @@ private:
           return;
         }
       }
-      const auto member = [&](const char *name, std::size_t i) {
-        return "\"" + std::string(name) + "\": " + std::string(words[i]);
-      };
-      newest_ = "{" + member("t_us", 2) + ", " + member("x_mm", 3) + ", " + member("y_mm", 4) + ", " +
-                member("force_N", 5) + ", " + member("qx_N", 6) + ", " + member("qy_N", 7) + "}";
+      const auto member = [&](const char *name, std::size_t i) { return "\"" + std::string(name) + "\": " + std::string(words[i]); };
+      newest_ = "{" + member("t_us", 2) + ", " + member("x_mm", 3) + ", " + member("y_mm", 4) + ", " + member("force_N", 5) + ", " +
+                member("qx_N", 6) + ", " + member("qy_N", 7) + "}";
     }
   }
 
@@ -150,15 +145,12 @@ private:
 Simulations::Simulations() = default;
 Simulations::~Simulations() = default;
 
-bool Simulations::is_for(const std::string &path) {
-  return path == PATH || path.rfind(std::string(PATH) + "/", 0) == 0;
-}
+bool Simulations::is_for(const std::string &path) { return path == PATH || path.rfind(std::string(PATH) + "/", 0) == 0; }
 
 bool Simulations::is_from_page(const HttpRequest &request) {
   const std::string site = request.header("sec-fetch-site");
   const std::string origin = request.header("origin");
-  return (site.empty() || site == "same-origin" || site == "none") &&
-         (origin.empty() || origin == "http://" + request.header("host"));
+  return (site.empty() || site == "same-origin" || site == "none") && (origin.empty() || origin == "http://" + request.header("host"));
 }
 
 HttpAnswer Simulations::answer(const HttpRequest &request) {
@@ -166,11 +158,10 @@ HttpAnswer Simulations::answer(const HttpRequest &request) {
   if (request.method == "GET" && what.empty()) {
     std::error_code none;
     const std::string hand = fs::exists(simulated_folder() + "/hand", none) ? "true" : "false";
-    return json(
-        "[" +
-        joined(find_simulated(), ", ",
-               [&](const Simulated &one) { return R"({"serial": ")" + one.serial + R"(", "hand": )" + hand + "}"; }) +
-        "]");
+    return json("[" +
+                joined(find_simulated(), ", ",
+                       [&](const Simulated &one) { return R"({"serial": ")" + one.serial + R"(", "hand": )" + hand + "}"; }) +
+                "]");
   }
   if (request.method == "GET" && what == "/line") {
     return open_line(request);
@@ -204,8 +195,7 @@ HttpAnswer Simulations::open_line(const HttpRequest &request) {
     return refusal(BAD_REQUEST, "client: give 8 to 32 hexadecimal digits");
   }
   const std::vector<Simulated> all = find_simulated();
-  const Simulated *one =
-      find_in(all, [&](const Simulated &each) { return each.serial == request.parameter("serial"); });
+  const Simulated *one = find_in(all, [&](const Simulated &each) { return each.serial == request.parameter("serial"); });
   if (!one) {
     return refusal(NOT_FOUND, "no simulated fingertip has this serial number; start fingertip simulate");
   }

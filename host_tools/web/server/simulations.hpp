@@ -8,9 +8,8 @@
  *                                          {"t_us", "x_mm", "y_mm", "force_N", "qx_N", "qy_N"}, or {} before it is
  * known
  *
- * client: 8 to 32 hexadecimal digits of the page's own, new for each line. A client is gone when its line is,
- * and what its hand pressed is lifted then. A request that another site makes is refused with 403. Errors are one
- * sentence, of status 4xx. */
+ * client: 8 to 32 hexadecimal digits of the page's own, new for each line. A client is gone when its line is, and what its hand pressed is
+ * lifted then. A request that another site makes is refused with 403. Errors are one sentence, of status 4xx. */
 #pragma once
 
 #include "web/server/http_server.hpp"

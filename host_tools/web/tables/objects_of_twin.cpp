@@ -17,8 +17,7 @@ template <typename Pressure> static ForcePlanes coarser(const Pressure &pressure
     const double force_N = ForcePlanes::force_at(f);
     for (int i = 0; i < ObjectsFile::NODES; i++) {
       for (int j = 0; j < ObjectsFile::NODES; j++) {
-        values.push_back(
-            static_cast<float>(pressure_Pa(force_N, ObjectsFile::STEP_mm * i, ObjectsFile::STEP_mm * j) / force_N));
+        values.push_back(static_cast<float>(pressure_Pa(force_N, ObjectsFile::STEP_mm * i, ObjectsFile::STEP_mm * j) / force_N));
       }
     }
   }
@@ -36,9 +35,8 @@ static Object object_of(const std::string &name, const std::filesystem::path &ca
     object.radius_mm.push_back(static_cast<float>(table.contact_radius_mm(force_N)));
     object.indentation_mm.push_back(static_cast<float>(table.indentation_mm(force_N)));
   }
-  object.normal =
-      coarser([&](double force_N, double x_mm, double y_mm) { return table.base_pressure_Pa(force_N, x_mm, y_mm); },
-              Symmetry::even, Symmetry::even);
+  object.normal = coarser([&](double force_N, double x_mm, double y_mm) { return table.base_pressure_Pa(force_N, x_mm, y_mm); },
+                          Symmetry::even, Symmetry::even);
   const auto pulled = [&](double x_share, double y_share) {
     return [&traction, x_share, y_share](double force_N, double x_mm, double y_mm) {
       return traction.base_pressure_Pa({force_N, 0.0, x_share * force_N, y_share * force_N}, x_mm, y_mm);

@@ -17,9 +17,7 @@ Bundle::Bundle(double friction, double kinetic_share) : static_(friction), kinet
     const double left = 1.0 - static_cast<double>(i) / ELEMENTS;
     return 1.0 - left * left;
   };
-  const auto slope = [&](std::size_t i) {
-    return i == ELEMENTS ? 0.0 : (mindlin(at(i + 1)) - mindlin(at(i))) / (at(i + 1) - at(i));
-  };
+  const auto slope = [&](std::size_t i) { return i == ELEMENTS ? 0.0 : (mindlin(at(i + 1)) - mindlin(at(i))) / (at(i + 1) - at(i)); };
   for (std::size_t i = 0; i < ELEMENTS; i++) {
     const double bend = slope(i) - slope(i + 1);
     stiffness_share_[i] = bend / 1.5;
@@ -58,8 +56,7 @@ Wrench Bundle::step(double seconds, double force_N, double stiffness_N_mm, doubl
     sum_y += y;
     sum_t += t;
     // What the motion puts in and the springs do not get.
-    lost_mW += x * motion.x_mm_s + y * motion.y_mm_s + t * turn_mm_s - x_N_[i] * stretch_x - y_N_[i] * stretch_y -
-               t_N_[i] * stretch_t;
+    lost_mW += x * motion.x_mm_s + y * motion.y_mm_s + t * turn_mm_s - x_N_[i] * stretch_x - y_N_[i] * stretch_y - t_N_[i] * stretch_t;
     const double k = stiffness_share_[i] * stiffness_N_mm * seconds;
     x_N_[i] += k * stretch_x;
     y_N_[i] += k * stretch_y;
@@ -81,8 +78,7 @@ Wrench Bundle::step(double seconds, double force_N, double stiffness_N_mm, doubl
 double Bundle::elastic_mJ(double stiffness_N_mm) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < ELEMENTS; i++) {
-    sum += (x_N_[i] * x_N_[i] + y_N_[i] * y_N_[i] + t_N_[i] * t_N_[i] / TURN_STIFFNESS) /
-           (2.0 * stiffness_share_[i] * stiffness_N_mm);
+    sum += (x_N_[i] * x_N_[i] + y_N_[i] * y_N_[i] + t_N_[i] * t_N_[i] / TURN_STIFFNESS) / (2.0 * stiffness_share_[i] * stiffness_N_mm);
   }
   return sum;
 }

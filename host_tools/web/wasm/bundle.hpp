@@ -1,17 +1,15 @@
 // One contact of a held object, along the rubber: two displacements and a turn.
 //
-// The model of simulation/twin/held_object.hpp in three directions: a bundle of elements side by side, each a spring
-// with a damper that ends in a slider (Iwan, J. Appl. Mech. 34, 1967), such that a growing pull
-// meets what Cattaneo and Mindlin's contact does. A turn counts by the way LEVER contact radii out
-// make of it, so that what friction holds is an ellipsoid,
+// The model of simulation/twin/held_object.hpp in three directions: a bundle of elements side by side, each a spring with a damper that
+// ends in a slider (Iwan, J. Appl. Mech. 34, 1967), such that a growing pull meets what Cattaneo and Mindlin's contact does. A turn counts
+// by the way LEVER contact radii out make of it, so that what friction holds is an ellipsoid,
 //   Qx^2 + Qy^2 + (T / (LEVER a))^2 <= (mu F)^2,   LEVER a mu F: torque that spins a Hertz contact
 // (Howe and Cutkosky, "Practical force-motion models for sliding manipulation", Int. J. Robotics
 // Research 15, 1996; the torque: Lubkin, J. Appl. Mech. 18, 1951). Sliding is along the
 // ellipsoid's normal. So an object that spins carries less, and one that slides is turned easily.
 //
-// Friction falls with gross slip and heals at rest by the twin's law and constants. A turn is
-// TURN_STIFFNESS as stiff as a pull, as on a half-space of nu = 0.5; its damping is the same, so a
-// swing rings on for longer than on real rubber.
+// Friction falls with gross slip and heals at rest by the twin's law and constants. A turn is TURN_STIFFNESS as stiff as a pull, as on a
+// half-space of nu = 0.5; its damping is the same, so a swing rings on for longer than on real rubber.
 //
 // Left out: the rubber's mass, its tangential relaxation, friction that grows with speed, rolling.
 #pragma once

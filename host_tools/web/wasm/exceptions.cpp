@@ -1,7 +1,6 @@
-// The runtime of C++ exceptions, on the exceptions of WebAssembly (legacy proposal; Chrome 95, node
-// 17): Debian's libc++ for it is built without. The compiler writes try, catch and rethrow; here is
-// what it calls: the exception objects, and which landing pad takes which (Itanium C++ ABI, its tables
-// of language-specific data). A class has one base at most. An uncaught exception ends the page's
+// The runtime of C++ exceptions, on the exceptions of WebAssembly (legacy proposal; Chrome 95, node 17): Debian's libc++ for it is built
+// without. The compiler writes try, catch and rethrow; here is what it calls: the exception objects, and which landing pad takes which
+// (Itanium C++ ABI, its tables of language-specific data). A class has one base at most. An uncaught exception ends the page's
 // call: module.mjs asks exception_text for its message.
 #include <cstddef>
 #include <cstdint>

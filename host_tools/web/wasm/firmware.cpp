@@ -1,6 +1,5 @@
-// The simulated fingertip's firmware for the page: simulation/player/native_fingertip.h, one a module. Times
-// are in microseconds since power-up. The pressures are those of a scenario or of the page's pad. The page
-// passes arrays by malloc and free.
+// The simulated fingertip's firmware for the page: simulation/player/native_fingertip.h, one a module. Times are in microseconds since
+// power-up. The pressures are those of a scenario or of the page's pad. The page passes arrays by malloc and free.
 #include "simulation/player/native_fingertip.h"
 #include "simulation/player/samples.hpp"
 #include "web/wasm/world.hpp"
@@ -30,8 +29,7 @@ constexpr double NOISE = 1.0, PROM_SPREAD = 0.03; // of native_fingertip_setting
 class Rows : public Samples {
 public:
   Rows() = default;
-  Rows(unsigned rows, double ambient_Pa, const double *times_s, const float *pressures_Pa,
-       const float *temperatures_degC) {
+  Rows(unsigned rows, double ambient_Pa, const double *times_s, const float *pressures_Pa, const float *temperatures_degC) {
     sensors_ = geometry.sensor_count;
     ambient_Pa_ = ambient_Pa;
     times_s_.assign(times_s, times_s + rows);
@@ -63,8 +61,7 @@ EXPORT(sensor_count) unsigned sensor_count() { return geometry.sensor_count; }
 
 // A scenario: times [rows], pressures above ambient [rows][sensors], temperatures [rows].
 EXPORT(rows_begin)
-void rows_begin(unsigned count, double ambient_Pa, const double *times_s, const float *pressures_Pa,
-                const float *temperatures_degC) {
+void rows_begin(unsigned count, double ambient_Pa, const double *times_s, const float *pressures_Pa, const float *temperatures_degC) {
   rows.emplace(count, ambient_Pa, times_s, pressures_Pa, temperatures_degC);
 }
 
@@ -73,8 +70,7 @@ EXPORT(world_begin)
 void world_begin(const std::uint8_t *file, unsigned bytes, const char *errors, double seed) {
   ObjectsFile read = read_objects(file, bytes);
   pad_command = std::move(read.pad_command);
-  world =
-      std::make_unique<World>(std::move(read.objects), twin::parse_effects(errors), static_cast<std::uint64_t>(seed));
+  world = std::make_unique<World>(std::move(read.objects), twin::parse_effects(errors), static_cast<std::uint64_t>(seed));
 }
 // The command that sets the firmware's pad profile.
 EXPORT(pad_command_at) const std::uint8_t *pad_command_at() { return pad_command.data(); }
@@ -98,8 +94,7 @@ EXPORT(world_lift) void world_lift() { world->lift(); }
 EXPORT(world_friction) void world_friction(double friction) { world->set_friction(friction); }
 EXPORT(world_truth) const double *world_truth() {
   const Truth &now = world->truth();
-  const double values[] = {now.t_s,  now.contact ? 1.0 : 0.0, now.x_mm, now.y_mm, now.force_N, now.qx_N,
-                           now.qy_N, now.slips ? 1.0 : 0.0};
+  const double values[] = {now.t_s, now.contact ? 1.0 : 0.0, now.x_mm, now.y_mm, now.force_N, now.qx_N, now.qy_N, now.slips ? 1.0 : 0.0};
   std::copy(std::begin(values), std::end(values), truth);
   return truth;
 }
@@ -122,8 +117,8 @@ EXPORT(power_up) void power_up(const char *serial, double seed, int parallel_bus
     settings.flash = kept;
   }
   settings.pad = profile ? &*profile : nullptr;
-  settings.world = rows ? sim_world{nullptr, pressure_of_rows_Pa, temperature_of_rows_degC}
-                        : sim_world{nullptr, pressure_of_world_Pa, nullptr};
+  settings.world =
+      rows ? sim_world{nullptr, pressure_of_rows_Pa, temperature_of_rows_degC} : sim_world{nullptr, pressure_of_world_Pa, nullptr};
   (void)native_fingertip_start(&settings); // this scene refuses nothing
 }
 // Imports fingertip.leave where the firmware ends itself.

@@ -1,6 +1,5 @@
-// The tool's calibrations and its doctor for the page (src/judges/judges.ts explains each).
-// Packets and texts come in by room(), answers go out as JSON by answer_at().
-// The page frees the sessions. Errors are exceptions (exceptions.cpp).
+// The tool's calibrations and its doctor for the page (src/judges/judges.ts explains each). Packets and texts come in by room(), answers go
+// out as JSON by answer_at(). The page frees the sessions. Errors are exceptions (exceptions.cpp).
 #include "libfingertip/error.hpp"
 #include "tool/calibration/gain_session.hpp"
 #include "tool/calibration/pulls.hpp"
@@ -29,8 +28,7 @@ std::string answer;
 wire_packet packet() {
   wire_packet decoded;
   std::vector<std::uint8_t> frame = given; // decoding overwrites it
-  if (frame.size() > WIRE_MAX_FRAME_BYTES ||
-      wire_decode(wire_all_layouts, frame.data(), frame.size(), &decoded) != FT_OK) {
+  if (frame.size() > WIRE_MAX_FRAME_BYTES || wire_decode(wire_all_layouts, frame.data(), frame.size(), &decoded) != FT_OK) {
     throw Error("a packet of the fingertip is damaged; connect again");
   }
   return decoded;
@@ -48,9 +46,7 @@ template <typename State> const char *name_of(State state) {
   return state == State::more ? "more" : state == State::good ? "good" : "refused";
 }
 
-json scatter_of(const calibrating::Scatter &scatter) {
-  return {{"location_mm", scatter.location_mm}, {"force", scatter.force}};
-}
+json scatter_of(const calibrating::Scatter &scatter) { return {{"location_mm", scatter.location_mm}, {"force", scatter.force}}; }
 
 void answer_with(const json &values) { answer = values.dump(); }
 
@@ -105,8 +101,8 @@ void gains_result(const GainSession *session, double force_N, double date_s) {
   if (session->judgement().state != calibrating::Judgement::State::good) {
     throw Error("not calibrated: " + session->judgement().text);
   }
-  const calibration made = session->made(std::isnan(force_N) ? std::nullopt : std::optional<double>(force_N),
-                                         static_cast<std::uint32_t>(date_s));
+  const calibration made =
+      session->made(std::isnan(force_N) ? std::nullopt : std::optional<double>(force_N), static_cast<std::uint32_t>(date_s));
   const auto of_sensors = [&](auto member) {
     json values = json::array();
     for (std::size_t k = 0; k < session->array().sensors(); k++) {
@@ -182,12 +178,8 @@ EXPORT(doctor_begin) Examined *doctor_begin(unsigned major, unsigned minor, unsi
 }
 EXPORT(doctor_free) void doctor_free(Examined *examined) { delete examined; }
 EXPORT(doctor_info) void doctor_info(Examined *examined) { examined->facts.info = packet_of(WIRE_INFO).body.info; }
-EXPORT(doctor_before) void doctor_before(Examined *examined) {
-  examined->facts.before = packet_of(WIRE_HEALTH).body.health;
-}
-EXPORT(doctor_after) void doctor_after(Examined *examined) {
-  examined->facts.after = packet_of(WIRE_HEALTH).body.health;
-}
+EXPORT(doctor_before) void doctor_before(Examined *examined) { examined->facts.before = packet_of(WIRE_HEALTH).body.health; }
+EXPORT(doctor_after) void doctor_after(Examined *examined) { examined->facts.after = packet_of(WIRE_HEALTH).body.health; }
 EXPORT(doctor_crash) void doctor_crash(Examined *examined) {
   const crash_record record = packet_of(WIRE_CRASH).body.crash;
   if (record.kind != CRASH_NONE) {
@@ -200,8 +192,8 @@ EXPORT(doctor_take) void doctor_take(Examined *examined) {
 }
 EXPORT(doctor_seconds) double doctor_seconds(const Examined *examined) { return examined->rest.seconds(); }
 EXPORT(doctor_line)
-void doctor_line(Examined *examined, double bytes, double packets, double dropped_packets, double out_of_order,
-                 double crc_errors, double format_errors) {
+void doctor_line(Examined *examined, double bytes, double packets, double dropped_packets, double out_of_order, double crc_errors,
+                 double format_errors) {
   LineStatistics &line = examined->facts.line;
   line.bytes = static_cast<std::uint64_t>(bytes);
   line.packets = static_cast<std::uint64_t>(packets);
@@ -216,10 +208,8 @@ EXPORT(doctor_status) void doctor_status(Examined *examined) {
   }
   json findings = json::array();
   for (const Finding &finding : judge(examined->facts)) {
-    findings.push_back({{"verdict", verdict_text(finding.verdict)},
-                        {"check", finding.check},
-                        {"text", finding.text},
-                        {"advice", finding.advice}});
+    findings.push_back(
+        {{"verdict", verdict_text(finding.verdict)}, {"check", finding.check}, {"text", finding.text}, {"advice", finding.advice}});
   }
   answer_with(findings);
 }

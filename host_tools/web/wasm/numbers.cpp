@@ -10,16 +10,14 @@
 namespace fingertip {
 
 // strtod takes more than std::from_chars does: blanks, "+", hexadecimal, and what is too small to be anything but 0.
-template <typename Number>
-static std::optional<Number> parsed(std::string_view text, Number (*convert)(const char *, char **)) {
+template <typename Number> static std::optional<Number> parsed(std::string_view text, Number (*convert)(const char *, char **)) {
   if (text.empty() || text.find_first_not_of("0123456789.eE+-") != std::string_view::npos || text[0] == '+') {
     return std::nullopt;
   }
   const std::string copy(text);
   char *end = nullptr;
   const Number value = convert(copy.c_str(), &end);
-  const bool vanished = value == Number(0) &&
-                        text.substr(0, text.find_first_of("eE")).find_first_of("123456789") != std::string_view::npos;
+  const bool vanished = value == Number(0) && text.substr(0, text.find_first_of("eE")).find_first_of("123456789") != std::string_view::npos;
   return end == copy.c_str() + copy.size() && std::isfinite(value) && !vanished ? std::optional(value) : std::nullopt;
 }
 

@@ -1,9 +1,7 @@
-// The contact shapes of the simulated pad, as a file: the pressure on the base of the rubber per force
-// of each object, from the twin's tables (twin/contact_table.hpp, simulation/twin/traction_table.hpp), at places
-// farther apart and in 16 bits.
+// The contact shapes of the simulated pad, as a file: the pressure on the base of the rubber per force of each object, from the twin's
+// tables (twin/contact_table.hpp, simulation/twin/traction_table.hpp), at places farther apart and in 16 bits.
 //
-// All values are little-endian. The file begins with 8 bytes "FTPAD 1\n" and the number of objects
-// as a uint32; each object has
+// All values are little-endian. The file begins with 8 bytes "FTPAD 1\n" and the number of objects as a uint32; each object has
 //   name       16 bytes, zero-padded: of simulation/twin/indenter.hpp
 //   radius     [force] floats, mm, of the contact
 //   indented   [force] floats, mm

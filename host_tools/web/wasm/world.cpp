@@ -23,14 +23,12 @@ static bool all_finite(std::initializer_list<double> values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
-static bool on_pad(double x_mm, double y_mm) {
-  return std::abs(x_mm) <= World::HALF_WIDTH_mm && std::abs(y_mm) <= World::HALF_LENGTH_mm;
-}
+static bool on_pad(double x_mm, double y_mm) { return std::abs(x_mm) <= World::HALF_WIDTH_mm && std::abs(y_mm) <= World::HALF_LENGTH_mm; }
 
 World::World(std::vector<Object> objects, const twin::EffectValues &errors, std::uint64_t seed)
-    : objects_(std::move(objects)), object_(objects_.data()),
-      errors_(errors, geometry.sensor_count, PAD_mm, AMBIENT_Pa, seed), bundle_(friction_, KINETIC_SHARE),
-      base_Pa_(geometry.sensor_count), before_Pa_(geometry.sensor_count), now_Pa_(geometry.sensor_count) {
+    : objects_(std::move(objects)), object_(objects_.data()), errors_(errors, geometry.sensor_count, PAD_mm, AMBIENT_Pa, seed),
+      bundle_(friction_, KINETIC_SHARE), base_Pa_(geometry.sensor_count), before_Pa_(geometry.sensor_count),
+      now_Pa_(geometry.sensor_count) {
   report();
   before_Pa_ = now_Pa_;
 }
@@ -98,9 +96,7 @@ void World::drop(double x_mm, double y_mm, double mass_kg) {
 
 // Below the least force of the tables, in proportion to the depth.
 double World::force_at_N(double depth_mm) const {
-  const auto depth_at_mm = [&](double force_N) {
-    return twin::ForcePlanes::between_forces(object_->indentation_mm, force_N);
-  };
+  const auto depth_at_mm = [&](double force_N) { return twin::ForcePlanes::between_forces(object_->indentation_mm, force_N); };
   const double least_mm = depth_at_mm(LEAST_N);
   if (depth_mm <= least_mm) {
     return depth_mm > 0.0 ? LEAST_N * depth_mm / least_mm : 0.0;
@@ -129,11 +125,9 @@ void World::move(double seconds) {
     vx_mm_s_ = (wanted_x_mm_ - x_mm_) / FOLLOWS_s;
     vy_mm_s_ = (wanted_y_mm_ - y_mm_) / FOLLOWS_s;
   }
-  const double radius_mm =
-      force_N_ > 0.0 ? twin::ForcePlanes::between_forces(object_->radius_mm, std::max(force_N_, LEAST_N)) : 0.0;
+  const double radius_mm = force_N_ > 0.0 ? twin::ForcePlanes::between_forces(object_->radius_mm, std::max(force_N_, LEAST_N)) : 0.0;
   const double touching_mm = std::max(radius_mm, 0.05);
-  const Wrench rubber =
-      bundle_.step(seconds, force_N_, SHEAR_N_mm2 * touching_mm, touching_mm, {vx_mm_s_, vy_mm_s_, 0.0});
+  const Wrench rubber = bundle_.step(seconds, force_N_, SHEAR_N_mm2 * touching_mm, touching_mm, {vx_mm_s_, vy_mm_s_, 0.0});
   if (way_ != Way::hand) {
     vx_mm_s_ += mN_PER_N * (load_x_N_ + rubber.x_N) / mass_kg_ * seconds;
     vy_mm_s_ += mN_PER_N * (load_y_N_ + rubber.y_N) / mass_kg_ * seconds;
@@ -159,13 +153,12 @@ void World::report() {
     truth_.qy_N = bundle_.pull_y_N();
     truth_.slips = bundle_.slips();
     const double pull_N = std::hypot(truth_.qx_N, truth_.qy_N);
-    const twin::TractionLoad load{force_N_, twin::stuck_force_N(force_N_, pull_N, bundle_.friction()), truth_.qx_N,
-                                  truth_.qy_N};
+    const twin::TractionLoad load{force_N_, twin::stuck_force_N(force_N_, pull_N, bundle_.friction()), truth_.qx_N, truth_.qy_N};
     for (std::size_t k = 0; k < base_Pa_.size(); k++) {
       const double dx_mm = static_cast<double>(geometry.x_mm[k]) - x_mm_;
       const double dy_mm = static_cast<double>(geometry.y_mm[k]) - y_mm_;
-      base_Pa_[k] = object_->normal.at(force_N_, dx_mm, dy_mm) +
-                    twin::traction_pressure_Pa(object_->along_x, object_->along_y, load, dx_mm, dy_mm);
+      base_Pa_[k] =
+          object_->normal.at(force_N_, dx_mm, dy_mm) + twin::traction_pressure_Pa(object_->along_x, object_->along_y, load, dx_mm, dy_mm);
     }
   }
   errors_.report(truth_.t_s, base_Pa_, now_Pa_);

@@ -1,13 +1,11 @@
 // What happens to the simulated pad: an object that a hand presses and drags, that falls on it and
 // lies there, or that a grip holds while a load pulls.
 //
-// The pad: silicone of 12 mm without ends; objects are known from the twin's tables (objects.hpp),
-// sensors' errors are its too (twin/effects.hpp). An object touches where its middle is within the
-// pad, 30 by 50 mm; beyond, it has fallen off.
+// The pad: silicone of 12 mm without ends; objects are known from the twin's tables (objects.hpp), sensors' errors are its too
+// (twin/effects.hpp). An object touches where its middle is within the pad, 30 by 50 mm; beyond, it has fallen off.
 //
-// Friction is that of the simulated cell (bundle.hpp): Coulomb's, static then kinetic, with
-// the rubber's give before all slides, which is 1 N/mm for each millimetre of contact radius. The
-// middle of the contact goes along with the object. Objects do not turn, roll or tilt.
+// Friction is that of the simulated cell (bundle.hpp): Coulomb's, static then kinetic, with the rubber's give before all slides, which is 1
+// N/mm for each millimetre of contact radius. The middle of the contact goes along with the object. Objects do not turn, roll or tilt.
 //
 //   press   the hand holds the object rigidly. Its place and force follow what is asked within
 //           FOLLOWS_s, so that a pointer's events make no jumps. What the hand does first is a new

@@ -59,8 +59,7 @@ public:
       const std::array<int, 60> at = unknowns(e);
       for (std::size_t q = 0; q < 16; q++) {
         const Vector3 s(POINT[q / 4], POINT[q % 4], 1.0);
-        const Vector3 t =
-            traction(place(e, s, 0), place(e, s, 1)) * WEIGHT[q / 4] * WEIGHT[q % 4] * size(e, 0) * size(e, 1) / 4.0;
+        const Vector3 t = traction(place(e, s, 0), place(e, s, 1)) * WEIGHT[q / 4] * WEIGHT[q % 4] * size(e, 0) * size(e, 1) / 4.0;
         for (int i = 0; i < 60; i++) {
           if (at[std::size_t(i)] >= 0) {
             force[at[std::size_t(i)]] += t[i % 3] * shape(i / 3, s);
@@ -71,9 +70,8 @@ public:
     moved_ = solver_.solve(force);
   }
 
-  // The pressure on the base times a weight of x and y, integrated over the quarter: the work of
-  // the base when it is lifted by the weight. Better than the stress at any point, which oscillates
-  // in rubber that hardly changes its volume.
+  // The pressure on the base times a weight of x and y, integrated over the quarter: the work of the base when it is lifted by the weight.
+  // Better than the stress at any point, which oscillates in rubber that hardly changes its volume.
   double base_work(const std::function<double(double, double)> &weight) const {
     double work = 0.0;
     for_each_element([&](const std::array<int, 3> &e) {
@@ -133,13 +131,9 @@ private:
     return 0.25 * others * (n[along] == 0.0 ? -2.0 * s[along] : n[along]);
   }
 
-  static Vector3 point(int q) {
-    return Vector3(q & 1 ? 1.0 : -1.0, q & 2 ? 1.0 : -1.0, q & 4 ? 1.0 : -1.0) / std::sqrt(3.0);
-  }
+  static Vector3 point(int q) { return Vector3(q & 1 ? 1.0 : -1.0, q & 2 ? 1.0 : -1.0, q & 4 ? 1.0 : -1.0) / std::sqrt(3.0); }
 
-  double size(const std::array<int, 3> &e, std::size_t d) const {
-    return edges_[d][std::size_t(e[d]) + 1] - edges_[d][std::size_t(e[d])];
-  }
+  double size(const std::array<int, 3> &e, std::size_t d) const { return edges_[d][std::size_t(e[d]) + 1] - edges_[d][std::size_t(e[d])]; }
   double volume(const std::array<int, 3> &e) const { return size(e, 0) * size(e, 1) * size(e, 2); }
   double place(const std::array<int, 3> &e, const Vector3 &s, std::size_t d) const {
     return edges_[d][std::size_t(e[d])] + 0.5 * (1.0 + s[Eigen::Index(d)]) * size(e, d);
@@ -181,9 +175,7 @@ private:
     }
   }
 
-  std::size_t lattice(int i, int j, int k) const {
-    return std::size_t((i * (2 * elements_[1] + 1) + j) * (2 * elements_[2] + 1) + k);
-  }
+  std::size_t lattice(int i, int j, int k) const { return std::size_t((i * (2 * elements_[1] + 1) + j) * (2 * elements_[2] + 1) + k); }
 
   // -1: held. Middles of faces and of elements have no node.
   void number_nodes(bool odd_x, bool odd_y) {

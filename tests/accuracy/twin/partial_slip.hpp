@@ -1,12 +1,11 @@
 // What sticks and what slides in a contact under a tangential force, solved for itself: the
 // traction q, nowhere above friction times pressure, that a rigid shift of the object finds.
 //
-// The least of 1/2 <q, C q> - shift <q_x> over |q| <= friction p, by accelerated projected
-// gradients (Beck and Teboulle, SIAM J. Imaging Sciences 2, 2009): where q is below its bound the
-// surface has moved by the shift; elsewhere it slides back along q (Kalker, Three-Dimensional
-// Elastic Bodies in Rolling Contact, Kluwer 1990, for one step from rest). C is the layer's
-// answer along and across each wave. Normal displacements are left alone: solved with them, a pull of 0.3 of 8 N
-// changes the base by 0.3 % of the tangential field's peak for sphere6 on 12 mm, by 12 % for sphere15 on 6 mm.
+// The least of 1/2 <q, C q> - shift <q_x> over |q| <= friction p, by accelerated projected gradients (Beck and Teboulle, SIAM J. Imaging
+// Sciences 2, 2009): where q is below its bound the surface has moved by the shift; elsewhere it slides back along q (Kalker,
+// Three-Dimensional Elastic Bodies in Rolling Contact, Kluwer 1990, for one step from rest). C is the layer's answer along and across each
+// wave. Normal displacements are left alone: solved with them, a pull of 0.3 of 8 N changes the base by 0.3 % of the tangential field's
+// peak for sphere6 on 12 mm, by 12 % for sphere15 on 6 mm.
 #pragma once
 
 #include "simulation/twin/contact.hpp"
@@ -41,8 +40,8 @@ struct Traction {
 class PartialSlip {
 public:
   PartialSlip(const Layer &layer, const Grid &grid)
-      : layer_(layer), grid_(grid), transform_(grid.nodes), xx_(transform_.waves()), xy_(transform_.waves()),
-        yy_(transform_.waves()), base_x_(transform_.waves()), base_y_(transform_.waves()) {
+      : layer_(layer), grid_(grid), transform_(grid.nodes), xx_(transform_.waves()), xy_(transform_.waves()), yy_(transform_.waves()),
+        base_x_(transform_.waves()), base_y_(transform_.waves()) {
     const double unit = 2.0 * M_PI / (grid.nodes * grid.step_mm);
     const double norm = 1.0 / (double(grid.nodes) * grid.nodes);
     const double h_per_G = layer.thickness_mm * 2.0 * (1.0 + layer.poisson) / layer.youngs_modulus_Pa;

@@ -13,9 +13,7 @@ const std::filesystem::path CACHE = FINGERTIP_TEST_CACHE_DIR;
 constexpr double FIELD_STEP_mm = 0.5;
 const BlockGrid COARSE{5, 8.0, 0.7, 0.04, 3.0};
 
-static Block around(double thickness_mm, double overhang_mm) {
-  return {silicone(thickness_mm), 9.0 + overhang_mm, 18.0 + overhang_mm};
-}
+static Block around(double thickness_mm, double overhang_mm) { return {silicone(thickness_mm), 9.0 + overhang_mm, 18.0 + overhang_mm}; }
 
 // Under a force of 1 N spread as exp(-r^2 / (2 s^2)) on a layer without end, at dx, dy from it: by
 // Hankel transforms, MPa. Of x, y, z; z is down.
@@ -48,8 +46,7 @@ struct LayerField {
 // Of a block's answer, Pa / N: x, y, down.
 static Eigen::Vector3d node(const BlockAnswer &answer, int i, int j) {
   const std::size_t n = std::size_t(i * answer.nodes_y + j);
-  return {static_cast<double>(answer.along_x[n]), static_cast<double>(answer.along_y[n]),
-          static_cast<double>(answer.down[n])};
+  return {static_cast<double>(answer.along_x[n]), static_cast<double>(answer.along_y[n]), static_cast<double>(answer.down[n])};
 }
 
 // A load spread as LayerField's on the block's surface.
@@ -72,8 +69,7 @@ static double bell(double dx, double dy, double s_mm) {
   return std::exp(-0.5 * (dx * dx + dy * dy) / (s_mm * s_mm)) / (2.0 * M_PI * s_mm * s_mm);
 }
 
-// The whole block under loads down and along x and y, four times a quarter, by twenty-node
-// elements, felt through a bell.
+// The whole block under loads down and along x and y, four times a quarter, by twenty-node elements, felt through a bell.
 TEST(TwinBlock, AgreesWithElementsOfTwentyNodesUnderTheLoadItself) {
   const Block block = around(12.0, 6.0);
   const double load_mm = 2.2, felt_mm = 1.5;
@@ -93,8 +89,7 @@ TEST(TwinBlock, AgreesWithElementsOfTwentyNodesUnderTheLoadItself) {
           double sum = 0.0;
           for (double sign_x : {1.0, -1.0}) {
             for (double sign_y : {1.0, -1.0}) {
-              sum += (flips_x ? sign_x : 1.0) * (flips_y ? sign_y : 1.0) *
-                     bell(x - sign_x * place.x_mm, y - sign_y * place.y_mm, s_mm);
+              sum += (flips_x ? sign_x : 1.0) * (flips_y ? sign_y : 1.0) * bell(x - sign_x * place.x_mm, y - sign_y * place.y_mm, s_mm);
             }
           }
           return sum;
@@ -202,16 +197,14 @@ TEST(TwinBlock, FourPointsStandForTheContact) {
     const char *name;
     double overhang_mm, allowed, middle_costs;
   };
-  for (const Case &one :
-       {Case{"sphere6", 9.0, 0.001, 0.003}, Case{"sphere15", 9.0, 0.003, 0.006}, Case{"sphere6", 6.0, 0.004, 0.015},
-        Case{"sphere15", 6.0, 0.013, 0.03}, Case{"cube6", 6.0, 0.011, 0.04}}) {
+  for (const Case &one : {Case{"sphere6", 9.0, 0.001, 0.003}, Case{"sphere15", 9.0, 0.003, 0.006}, Case{"sphere6", 6.0, 0.004, 0.015},
+                          Case{"sphere15", 6.0, 0.013, 0.03}, Case{"cube6", 6.0, 0.011, 0.04}}) {
     const double force_N = 8.0;
     const Place middle{9.0, 18.0};
     const std::vector<Place> sensors = sensor_places();
     const Block block = around(12.0, one.overhang_mm);
     const BlockTable table = BlockTable::load_or_build(block, sensors, CACHE);
-    const double radius_mm =
-        ContactTable::load_or_build(indenter(one.name), block.layer, CACHE).contact_radius_mm(force_N);
+    const double radius_mm = ContactTable::load_or_build(indenter(one.name), block.layer, CACHE).contact_radius_mm(force_N);
     const Grid grid{192, 0.25};
     const Contact contact = ContactSolver(indenter(one.name), block.layer, grid).solve(force_N);
     const Eigen::Vector3d peak = LayerField{block.layer, 0.0}.peak();
@@ -222,8 +215,7 @@ TEST(TwinBlock, FourPointsStandForTheContact) {
       }
       for (int c = 0; c < 3; c++) {
         const auto added = [&](double radius, double dx, double dy) {
-          return 1e-6 * table.added_Pa(k, {double(c == 2), double(c == 0), double(c == 1), radius}, middle.x_mm + dx,
-                                       middle.y_mm + dy);
+          return 1e-6 * table.added_Pa(k, {double(c == 2), double(c == 0), double(c == 1), radius}, middle.x_mm + dx, middle.y_mm + dy);
         };
         double sum = 0.0;
         for (int i = 0; i < grid.nodes; i++) {

@@ -57,8 +57,7 @@ TEST(TwinLayer, TractionHasItsLimits) {
     EXPECT_NEAR(tangential_transfer(1e-9, nu), 1e-9, 1e-20);
     EXPECT_NEAR(tangential_share(1e-9, nu), 1e-9, 1e-20);
     const double a = 2.0 * (1.0 - nu);
-    EXPECT_NEAR(tangential_transfer(20.0, nu) * std::exp(20.0), 2.0 * a * (20.0 + 1.0 - 2.0 * nu) / (3.0 - 4.0 * nu),
-                1e-6);
+    EXPECT_NEAR(tangential_transfer(20.0, nu) * std::exp(20.0), 2.0 * a * (20.0 + 1.0 - 2.0 * nu) / (3.0 - 4.0 * nu), 1e-6);
     EXPECT_EQ(tangential_transfer(1e6, nu), 0.0);
     EXPECT_NEAR(tangential_share(1e6, nu), 1.0, 1e-6);
     for (double H : {0.2, 1.0, 3.0, 10.0}) { // as one fraction
@@ -91,8 +90,7 @@ TEST(TwinContact, DiscOnAThickLayerSinksAsBoussinesqSays) {
   }
   const std::vector<double> sunk = solver.displacement_mm(pressure);
   const double middle = 2.0 * (1.0 - 0.49 * 0.49) * 1e5 * radius_mm / 1e6;
-  EXPECT_NEAR(sunk[at(grid, 0, 0)] - sunk[at(grid, 25, 0)], middle * (1.0 - 2.0 / M_PI),
-              0.01 * middle * (1.0 - 2.0 / M_PI));
+  EXPECT_NEAR(sunk[at(grid, 0, 0)] - sunk[at(grid, 25, 0)], middle * (1.0 - 2.0 / M_PI), 0.01 * middle * (1.0 - 2.0 / M_PI));
 }
 
 TEST(TwinContact, SphereOnAThickLayerIsHertz) {
@@ -182,8 +180,7 @@ TEST(TwinTable, InterpolatesToTwoThousandthsOfThePeak) {
       const double peak = contact.base_Pa[at(grid, 0, 0)];
       for (int i = -41; i <= 41; i += 3) {
         for (int j = 0; j <= 60; j += 5) {
-          EXPECT_NEAR(table.base_pressure_Pa(force_N, i * grid.step_mm, j * grid.step_mm),
-                      contact.base_Pa[at(grid, i, j)], 2e-3 * peak)
+          EXPECT_NEAR(table.base_pressure_Pa(force_N, i * grid.step_mm, j * grid.step_mm), contact.base_Pa[at(grid, i, j)], 2e-3 * peak)
               << name << " " << force_N << " N";
         }
       }

@@ -62,8 +62,7 @@ TEST(TwinTraction, TheTableIsTheTransformOfTheTraction) {
     const char *name;
     double thickness_mm, allowed, allowed_far; // in parts of the peak, to 30 and 44.5 mm
   };
-  for (const Case &one : {Case{"sphere6", 12.0, 0.004, 0.013}, Case{"cube6", 6.0, 0.002, 0.002},
-                          Case{"ball_bearing", 6.0, 0.008, 0.008}}) {
+  for (const Case &one : {Case{"sphere6", 12.0, 0.004, 0.013}, Case{"cube6", 6.0, 0.002, 0.002}, Case{"ball_bearing", 6.0, 0.008, 0.008}}) {
     const Layer layer = silicone(one.thickness_mm);
     const Grid grid = grid_for(indenter(one.name), layer);
     ContactSolver solver(indenter(one.name), layer, grid);
@@ -73,13 +72,11 @@ TEST(TwinTraction, TheTableIsTheTransformOfTheTraction) {
     const Contact whole = solver.solve(force_N), stuck = solver.solve(stuck_N);
     const std::vector<double> none(whole.pressure_Pa.size(), 0.0);
     for (bool slides : {true, false}) {
-      const std::vector<double> traction =
-          slides ? times(whole.pressure_Pa, friction) : stuck_within(whole, stuck, friction);
+      const std::vector<double> traction = slides ? times(whole.pressure_Pa, friction) : stuck_within(whole, stuck, friction);
       const double carried_N = friction * (slides ? force_N : force_N - stuck_N);
       for (bool along_x : {true, false}) {
         const std::vector<double> base = surface.base_Pa(along_x ? Traction{traction, none} : Traction{none, traction});
-        const TractionTable::Load load{force_N, slides ? 0.0 : stuck_N, along_x ? carried_N : 0.0,
-                                       along_x ? 0.0 : carried_N};
+        const TractionTable::Load load{force_N, slides ? 0.0 : stuck_N, along_x ? carried_N : 0.0, along_x ? 0.0 : carried_N};
         const double peak = largest(base);
         const auto off = [&](double reach_mm) {
           double most = 0.0;
@@ -124,8 +121,8 @@ TEST(TwinTraction, ARoundContactIsItsHankelTransform) {
       }
       return sum;
     };
-    const double indentation_mm = 2.0 * (1.0 - layer.poisson * layer.poisson) * thickness_mm / layer.youngs_modulus_Pa *
-                                  exact(0, 0.0, surface_compliance);
+    const double indentation_mm =
+        2.0 * (1.0 - layer.poisson * layer.poisson) * thickness_mm / layer.youngs_modulus_Pa * exact(0, 0.0, surface_compliance);
     EXPECT_NEAR(contact.indentation_mm, indentation_mm, 0.01 * indentation_mm);
     const TractionTable &table = tables_of("sphere15", thickness_mm).traction;
     double peak = 0.0, off = 0.0;
@@ -134,8 +131,7 @@ TEST(TwinTraction, ARoundContactIsItsHankelTransform) {
       peak = std::max(peak, ahead);
       EXPECT_NEAR(contact.base_Pa[at(grid, i, 0)], exact(0, r, base_transfer), 0.005 * largest(contact.base_Pa)) << r;
       for (double angle : {0.0, 0.7, 2.6}) {
-        const double found =
-            table.base_pressure_Pa({force_N, 0.0, force_N, 0.0}, r * std::cos(angle), r * std::sin(angle));
+        const double found = table.base_pressure_Pa({force_N, 0.0, force_N, 0.0}, r * std::cos(angle), r * std::sin(angle));
         off = std::max(off, std::abs(found - ahead * std::cos(angle)));
       }
     }
@@ -199,8 +195,8 @@ TEST(TwinTraction, TorsionIsNotFelt) {
     double sum = 0.0;
     for (int n = 0; n < CONTACTS; n++) {
       const double angle = 2.0 * M_PI * n / CONTACTS;
-      sum += table.base_pressure_Pa({2.0, 0.0, std::cos(angle + turn), std::sin(angle + turn)},
-                                    x - 5.0 * std::cos(angle), y - 5.0 * std::sin(angle)) /
+      sum += table.base_pressure_Pa({2.0, 0.0, std::cos(angle + turn), std::sin(angle + turn)}, x - 5.0 * std::cos(angle),
+                                    y - 5.0 * std::sin(angle)) /
              CONTACTS;
     }
     return sum;
@@ -225,8 +221,7 @@ TEST(TwinTraction, NoLoadIsNothingAndAFullOneSlides) {
   EXPECT_EQ(table.base_pressure_Pa({5.0, 0.0, 0.0, 0.0}, 3.0, 2.0), 0.0);
   // Next to nothing, too, presses in proportion.
   const auto per_newton = [&](double tangential_N) {
-    return table.base_pressure_Pa({5.0, stuck_force_N(5.0, tangential_N, 0.5), tangential_N, 0.0}, 6.0, 0.0) /
-           tangential_N;
+    return table.base_pressure_Pa({5.0, stuck_force_N(5.0, tangential_N, 0.5), tangential_N, 0.0}, 6.0, 0.0) / tangential_N;
   };
   EXPECT_NEAR(per_newton(1e-7) / per_newton(1e-2), 1.0, 1e-3);
 }
@@ -288,9 +283,9 @@ TEST(TwinTraction, WhatSticksOnALayerIsNearlyTheContactOfLessForce) {
     double thickness_mm, force_N, shift_mm, allowed;
   };
   const double friction = 0.5;
-  for (const Case &one : {Case{"sphere6", 12.0, 5.0, 0.35, 0.002}, Case{"sphere15", 12.0, 8.0, 0.5, 0.005},
-                          Case{"sphere15", 6.0, 8.0, 0.5, 0.013}, Case{"cube6", 12.0, 5.0, 0.4, 0.012},
-                          Case{"cube6", 6.0, 5.0, 0.4, 0.03}}) {
+  for (const Case &one :
+       {Case{"sphere6", 12.0, 5.0, 0.35, 0.002}, Case{"sphere15", 12.0, 8.0, 0.5, 0.005}, Case{"sphere15", 6.0, 8.0, 0.5, 0.013},
+        Case{"cube6", 12.0, 5.0, 0.4, 0.012}, Case{"cube6", 6.0, 5.0, 0.4, 0.03}}) {
     const Layer layer = silicone(one.thickness_mm);
     const Grid grid{192, 0.25};
     ContactSolver solver(indenter(one.name), layer, grid);

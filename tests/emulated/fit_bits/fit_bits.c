@@ -78,9 +78,7 @@ static int64_t exp2_negative_q30(int64_t z_q16) {
   return value_q32 >> (2 + whole);
 }
 
-static int32_t to_int32(int64_t value) {
-  return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;
-}
+static int32_t to_int32(int64_t value) { return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value; }
 
 /* A press near the array, of every width and height, and its noise. */
 static void draw_press(const struct fit_array *array, int64_t height_q16, int32_t noise, int32_t *pressure_Pa_q10) {
@@ -130,13 +128,10 @@ static uint32_t bits_of_shapes(const struct fit_array *array, uint32_t usable, c
       pressure_Pa_q10[k] -= pressure_Pa_q10[k] / 256 * draw_between(0, 1);
     }
   }
-  return crc32_iso_hdlc((const uint8_t *)found, sizeof found) ^
-         crc32_iso_hdlc((const uint8_t *)&state.at, sizeof state.at);
+  return crc32_iso_hdlc((const uint8_t *)found, sizeof found) ^ crc32_iso_hdlc((const uint8_t *)&state.at, sizeof state.at);
 }
 
-uint32_t fit_bits_presses(enum fit_bits_kernel kernel) {
-  return kernel == FIT_BITS_SHAPES ? 2000 : 10000; /* of that many frames each */
-}
+uint32_t fit_bits_presses(enum fit_bits_kernel kernel) { return kernel == FIT_BITS_SHAPES ? 2000 : 10000; /* of that many frames each */ }
 
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   draw_from(UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel);
@@ -185,8 +180,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
       pressure_Pa_q10[k] = draw_between(INT32_MIN, INT32_MAX) >> shift;
     }
   } else {
-    /* 1 / (2 sigma^2) in powers of 2 over pitches squared: sigma 0.2 to 3.4 pitches; of a pad what
-     * its thickness makes of a contact. */
+    /* 1 / (2 sigma^2) in powers of 2 over pitches squared: sigma 0.2 to 3.4 pitches; of a pad what its thickness makes of a contact. */
     int32_t any_q16 = draw_between(ONE_Q16, 2 * ONE_Q16);
     int64_t height_q16 = (int64_t)any_q16 << draw_between(0, 7) >> 4;
     int64_t thickness = kernel == FIT_BITS_SHAPES ? 2 : press / 4 % PADS + 1; /* 5 mm */
@@ -243,8 +237,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     memset(&tangential_state, 0, sizeof tangential_state);
     for (int frame = 0; frame < FRAMES; frame++) {
       fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
-      fit_tangential_estimate(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result, &tangential_state,
-                              &found[frame]);
+      fit_tangential_estimate(array, &pads[press / 4 % PADS], pressure_Pa_q10, &settings, &result, &tangential_state, &found[frame]);
       for (uint8_t k = 0; k < array->sensor_count; k++) {
         pressure_Pa_q10[k] -= pressure_Pa_q10[k] / 64 * draw_between(0, 1);
       }

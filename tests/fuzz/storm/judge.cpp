@@ -89,9 +89,7 @@ void Judge::close(std::uint64_t t_us) {
   open_ = false;
 }
 
-void Judge::sent(std::uint64_t t_us, const wire_packet &command) {
-  asked_[command.sequence] = {command.type, t_us, command.t_us};
-}
+void Judge::sent(std::uint64_t t_us, const wire_packet &command) { asked_[command.sequence] = {command.type, t_us, command.t_us}; }
 
 void Judge::received(std::uint64_t t_us, const std::uint8_t *bytes, std::size_t count) {
   if (!open_) {
@@ -139,9 +137,7 @@ void Judge::check_clock(std::uint64_t t_us, const wire_packet &packet) {
     return;
   }
   if (packet.t_us < last_answer_us_ || packet.t_us < last_frame_us_) {
-    find("time", t_us,
-         text("answer of %llu us after %llu us", number(packet.t_us),
-              number(std::max(last_answer_us_, last_frame_us_))));
+    find("time", t_us, text("answer of %llu us after %llu us", number(packet.t_us), number(std::max(last_answer_us_, last_frame_us_))));
   }
   last_answer_us_ = packet.t_us;
 }
@@ -150,20 +146,11 @@ void Judge::packet(std::uint64_t t_us, const wire_packet &packet) {
   count_sequence(t_us, packet);
   check_clock(t_us, packet);
   switch (packet.type) {
-  case WIRE_CONTACT:
-    judge_contact(t_us, packet);
-    break;
-  case WIRE_RAW:
-    judge_raw(t_us, packet);
-    break;
-  case WIRE_HEALTH:
-    judge_health(t_us, packet);
-    break;
-  case WIRE_ACK:
-    judge_ack(t_us, packet);
-    break;
-  default:
-    break;
+  case WIRE_CONTACT: judge_contact(t_us, packet); break;
+  case WIRE_RAW: judge_raw(t_us, packet); break;
+  case WIRE_HEALTH: judge_health(t_us, packet); break;
+  case WIRE_ACK: judge_ack(t_us, packet); break;
+  default: break;
   }
   if (counted_) {
     counted_->received++;
@@ -218,8 +205,7 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
 
   const std::uint64_t measured_us = bench_us(packet.t_us);
   const Row truth = world_.at(measured_us);
-  const bool good =
-      (flags & CONTACT_FLAG_TARED) && !(flags & (CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_SENSOR_DOUBTFUL));
+  const bool good = (flags & CONTACT_FLAG_TARED) && !(flags & (CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_SENSOR_DOUBTFUL));
   good_in_a_row_ = good ? good_in_a_row_ + 1 : 0;
 
   if (flags & WARNINGS) {
@@ -227,30 +213,27 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
   }
   if (flags & CONTACT_FLAG_FIT_VALID) {
     figures_.judged++;
-    const double error_mm =
-        std::hypot(static_cast<double>(contact.x_mm) - truth.x_mm, static_cast<double>(contact.y_mm) - truth.y_mm);
+    const double error_mm = std::hypot(static_cast<double>(contact.x_mm) - truth.x_mm, static_cast<double>(contact.y_mm) - truth.y_mm);
     const double force_N = truth.force_N();
     const double error_N = std::fabs(static_cast<double>(contact.force_N) - force_N);
     const double share = std::max(0.0, error_N - FORCE_BOUND_N) / std::max(force_N, 1e-9);
-    const bool touched =
-        truth.peak_Pa > 0 || measured_us < RELEASED_FOR_us || world_.at(measured_us - RELEASED_FOR_us).peak_Pa > 0;
+    const bool touched = truth.peak_Pa > 0 || measured_us < RELEASED_FOR_us || world_.at(measured_us - RELEASED_FOR_us).peak_Pa > 0;
     if (!touched) {
-      wrong(t_us,
-            text("frame %u says %.2f N where nothing touches", contact.frame, static_cast<double>(contact.force_N)));
+      wrong(t_us, text("frame %u says %.2f N where nothing touches", contact.frame, static_cast<double>(contact.force_N)));
     } else if (truth.peak_Pa >= SENSED_Pa) {
       const double allowed_mm = allowed_sds_ * static_cast<double>(contact.location_sd_mm);
       if (error_mm > std::max(LOCATION_BOUND_mm, allowed_mm) || share > FORCE_BOUND_SHARE) {
         wrong(t_us, text("frame %u, flags %05x: %.2f mm off, %.3f N instead of %.3f, at %.1f %.1f "
                          "mm, sensors %04x, sd %.2f mm",
-                         contact.frame, flags, error_mm, static_cast<double>(contact.force_N), force_N, truth.x_mm,
-                         truth.y_mm, contact.sensors_used, static_cast<double>(contact.location_sd_mm)));
+                         contact.frame, flags, error_mm, static_cast<double>(contact.force_N), force_N, truth.x_mm, truth.y_mm,
+                         contact.sensors_used, static_cast<double>(contact.location_sd_mm)));
       }
     }
   } else if ((flags & CONTACT_FLAG_TARED) && !(flags & CONTACT_FLAG_CONTACT)) {
     figures_.judged++;
     if (measured_us >= SENSED_FOR_us && is_firm(measured_us - SENSED_FOR_us) && is_firm(measured_us)) {
-      wrong(t_us, text("frame %u, flags %05x, says that nothing touches, where a sensor feels %.0f Pa", contact.frame,
-                       flags, truth.peak_Pa));
+      wrong(t_us,
+            text("frame %u, flags %05x, says that nothing touches, where a sensor feels %.0f Pa", contact.frame, flags, truth.peak_Pa));
     }
   }
 }
@@ -282,9 +265,9 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
 void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
   const wire_health &health = packet.body.health;
   if (static_cast<std::uint16_t>(health.packets_sent + health.packets_dropped) != packet.sequence) {
-    find("loss", t_us,
-         text("%u packets sent and %u dropped before the one with number %u", health.packets_sent,
-              health.packets_dropped, packet.sequence));
+    find(
+        "loss", t_us,
+        text("%u packets sent and %u dropped before the one with number %u", health.packets_sent, health.packets_dropped, packet.sequence));
   }
   const double uptime_s = 1e-6 * (static_cast<double>(packet.t_us) - began_us_);
   if (health.uptime_s > uptime_s || health.uptime_s < uptime_s - UPTIME_LAG_s) {
@@ -292,9 +275,9 @@ void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
   }
   if (health_of_life_) {
     using H = wire_health;
-    for (const auto counter : {&H::frames, &H::frames_incomplete, &H::frames_skipped, &H::packets_sent,
-                               &H::packets_dropped, &H::commands_done, &H::commands_rejected, &H::bus_nacks,
-                               &H::bus_timeouts, &H::bus_recoveries, &H::zero_readings, &H::implausible_readings}) {
+    for (const auto counter :
+         {&H::frames, &H::frames_incomplete, &H::frames_skipped, &H::packets_sent, &H::packets_dropped, &H::commands_done,
+          &H::commands_rejected, &H::bus_nacks, &H::bus_timeouts, &H::bus_recoveries, &H::zero_readings, &H::implausible_readings}) {
       if (health.*counter - (*health_of_life_).*counter >= 0x80000000u) {
         find("loss", t_us, "a counter of the health packet went back");
         break;
@@ -334,10 +317,8 @@ void Judge::judge_health(std::uint64_t t_us, const wire_packet &packet) {
 void Judge::judge_ack(std::uint64_t t_us, const wire_packet &packet) {
   const wire_ack &ack = packet.body.ack;
   const auto question = asked_.find(ack.sequence);
-  if (question == asked_.end() || question->second.type != ack.command ||
-      question->second.host_time_us != ack.host_time_us) {
-    find("answer", t_us,
-         text("an answer to command 0x%02x with number %u, which was not sent", ack.command, ack.sequence));
+  if (question == asked_.end() || question->second.type != ack.command || question->second.host_time_us != ack.host_time_us) {
+    find("answer", t_us, text("an answer to command 0x%02x with number %u, which was not sent", ack.command, ack.sequence));
     return;
   }
   asked_.erase(question);

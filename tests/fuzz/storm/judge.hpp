@@ -9,12 +9,11 @@
 //   answer   an acknowledgement is of a command that was sent, once; stages add up
 //   wrong    a frame without a warning tells the truth within the bounds below
 //
-// A contact of less than a quarter of the strongest in the last minute may go unfelt, for it may be rubber that has not
-// let go yet (condition.h). Bounds of what is said of any: the simulated pad is what the fit takes a contact for, its
-// gains are all 1, and a frame without a warning says that its location is good to 0.6 mm of standard deviation
-// (UNCERTAIN has that limit): LOCATION_BOUND_mm is twice that, FORCE_BOUND what an unwarned corner contact may be off
-// by. READING_BOUND_Pa is what a temperature makes of a reading that is 5 degC wrong: so far from the others a sensor's
-// first one may be (readings.h), 245 Pa a degree; beside the noise.
+// A contact of less than a quarter of the strongest in the last minute may go unfelt, for it may be rubber that has not let go yet
+// (condition.h). Bounds of what is said of any: the simulated pad is what the fit takes a contact for, its gains are all 1, and a frame
+// without a warning says that its location is good to 0.6 mm of standard deviation (UNCERTAIN has that limit): LOCATION_BOUND_mm is twice
+// that, FORCE_BOUND what an unwarned corner contact may be off by. READING_BOUND_Pa is what a temperature makes of a reading that is 5 degC
+// wrong: so far from the others a sensor's first one may be (readings.h), 245 Pa a degree; beside the noise.
 #pragma once
 
 #include "libfingertip/wire.hpp"

@@ -40,13 +40,9 @@ struct Bench {
   std::uint64_t zero_us;
 } bench;
 
-double pressure_Pa(void *, unsigned sensor, std::uint64_t t_us) {
-  return bench.world->pressure_Pa(sensor, bench.zero_us + t_us);
-}
+double pressure_Pa(void *, unsigned sensor, std::uint64_t t_us) { return bench.world->pressure_Pa(sensor, bench.zero_us + t_us); }
 
-double temperature_degC(void *, unsigned, std::uint64_t t_us) {
-  return bench.world->temperature_degC(bench.zero_us + t_us);
-}
+double temperature_degC(void *, unsigned, std::uint64_t t_us) { return bench.world->temperature_degC(bench.zero_us + t_us); }
 
 } // namespace
 
@@ -78,9 +74,9 @@ void NativePlant::start(std::uint64_t t_us, std::uint64_t clock_us, Judge *judge
 
 void NativePlant::schedule(const Fault &fault) {
   const auto add = [&](const Change &change) {
-    changes_.insert(std::upper_bound(changes_.begin(), changes_.end(), change,
-                                     [](const Change &a, const Change &b) { return a.t_us < b.t_us; }),
-                    change);
+    changes_.insert(
+        std::upper_bound(changes_.begin(), changes_.end(), change, [](const Change &a, const Change &b) { return a.t_us < b.t_us; }),
+        change);
   };
   add({fault.from_us, fault, true});
   if (fault.to_us > fault.from_us) {
@@ -88,9 +84,7 @@ void NativePlant::schedule(const Fault &fault) {
   }
 }
 
-void NativePlant::write(const std::vector<std::uint8_t> &bytes) {
-  to_send_.insert(to_send_.end(), bytes.begin(), bytes.end());
-}
+void NativePlant::write(const std::vector<std::uint8_t> &bytes) { to_send_.insert(to_send_.end(), bytes.begin(), bytes.end()); }
 
 void NativePlant::update_port(std::uint64_t t_us, Judge &judge) {
   const bool open = has_power_ && closed_ == 0 && asleep_ == 0;
@@ -114,8 +108,7 @@ void NativePlant::act(const Change &change, Judge &judge) {
   const unsigned sensor = change.fault.sensor;
   struct sim_array *array = storm_firmware_array();
   const auto strike = [&](enum sim_fault_kind what, std::uint32_t count = 1, std::uint32_t mask = 0) {
-    array->fault = {what, array->transfers + 1 + random_below(&random_, 2 * SENSORS), count, mask,
-                    static_cast<std::uint8_t>(sensor)};
+    array->fault = {what, array->transfers + 1 + random_below(&random_, 2 * SENSORS), count, mask, static_cast<std::uint8_t>(sensor)};
   };
   if (kind == "sensor_nack") {
     strike(SIM_FAULT_NACK);
@@ -179,12 +172,8 @@ void NativePlant::run_firmware(std::uint64_t t_us) {
     return;
   }
   switch (storm_firmware_run_until(t_us - zero_us_)) {
-  case NATIVE_PANIC:
-    ended_ = "panic";
-    break;
-  case NATIVE_LOADER:
-    ended_ = "it left for the loader";
-    break;
+  case NATIVE_PANIC: ended_ = "panic"; break;
+  case NATIVE_LOADER: ended_ = "it left for the loader"; break;
   default:
     if (native_watchdog_expired()) {
       ended_ = "the watchdog was not fed";

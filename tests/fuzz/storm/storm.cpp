@@ -35,9 +35,7 @@ constexpr Target ON_THE_LINE[] = {
     {"store_writes", 100000, 1500000},
 };
 
-static wire_packet set(const std::string &text) {
-  return fingertip::setting_commands({fingertip::setting_from_text(text)}, {})[0];
-}
+static wire_packet set(const std::string &text) { return fingertip::setting_commands({fingertip::setting_from_text(text)}, {})[0]; }
 
 Storm::Storm(NativePlant &plant, World &world, Judge &judge, std::uint64_t seed, fuzz_input input)
     : plant_(plant), world_(world), judge_(judge), input_(input), random_{seed * 2 + 0x5EED} {
@@ -83,26 +81,17 @@ void Storm::write_some_command() {
   struct random *r = &random_;
   wire_packet packet{};
   switch (random_below(r, 12)) {
-  case 0:
-    return write(set("osr=" + std::to_string(256u << random_below(r, 6))));
-  case 1:
-    return write(
-        set("rate=" + (random_below(r, 2) ? "max" : fingertip::fixed(20 + 1e-3 * random_below(r, 1980000), 3))));
+  case 0: return write(set("osr=" + std::to_string(256u << random_below(r, 6))));
+  case 1: return write(set("rate=" + (random_below(r, 2) ? "max" : fingertip::fixed(20 + 1e-3 * random_below(r, 1980000), 3))));
   case 2:
     packet = set("slip_threshold=" + fingertip::fixed(random_between(r, 0.05, 5), 6));
     packet.body.cmd_slip.window_ms = static_cast<std::uint16_t>(5 + random_below(r, 900));
     return write(packet);
-  case 3:
-    return write(set(random_below(r, 2) ? "prior=none" : "prior=6.5:3"));
-  case 4:
-    return write(set("limit=" + fingertip::fixed(random_between(r, 0.3, 0.6), 6)));
-  case 5:
-    return write(fingertip::command_health());
-  case 6:
-    return write(fingertip::command_info());
-  case 7:
-    streams_ = random_below(r, 2) ? 7 : WIRE_STREAM_CONTACT | WIRE_STREAM_HEALTH;
-    return write(fingertip::command_stream(streams_));
+  case 3: return write(set(random_below(r, 2) ? "prior=none" : "prior=6.5:3"));
+  case 4: return write(set("limit=" + fingertip::fixed(random_between(r, 0.3, 0.6), 6)));
+  case 5: return write(fingertip::command_health());
+  case 6: return write(fingertip::command_info());
+  case 7: streams_ = random_below(r, 2) ? 7 : WIRE_STREAM_CONTACT | WIRE_STREAM_HEALTH; return write(fingertip::command_stream(streams_));
   case 8: // out of range
     packet.type = WIRE_CMD_OSR;
     packet.body.cmd_osr.osr = static_cast<std::uint16_t>(random_u32(r) | 1);
@@ -135,12 +124,9 @@ void Storm::write_something_to_store() {
     calibration.sensors[k] = {1.0f, 0.01f, 0, 0, 0};
   }
   switch (random_below(r, 4)) {
-  case 0:
-    return write(fingertip::command_calibrate(calibration, SENSORS));
-  case 1:
-    return write(fingertip::command_erase_calibration());
-  default:
-    return write(fingertip::command_keep(random_below(r, 3) != 0));
+  case 0: return write(fingertip::command_calibrate(calibration, SENSORS));
+  case 1: return write(fingertip::command_erase_calibration());
+  default: return write(fingertip::command_keep(random_below(r, 3) != 0));
   }
 }
 
@@ -155,8 +141,8 @@ void Storm::add_fault(const Target &target, std::uint64_t from_us) {
   }
   ends_us_ = std::max(ends_us_, fault.to_us);
   char text[120];
-  std::snprintf(text, sizeof text, "%s%s %u %.3f to %.3f s", scene_.empty() ? "" : ", ", fault.kind.c_str(),
-                fault.sensor, 1e-6 * static_cast<double>(fault.from_us), 1e-6 * static_cast<double>(fault.to_us));
+  std::snprintf(text, sizeof text, "%s%s %u %.3f to %.3f s", scene_.empty() ? "" : ", ", fault.kind.c_str(), fault.sensor,
+                1e-6 * static_cast<double>(fault.from_us), 1e-6 * static_cast<double>(fault.to_us));
   scene_ += text;
   if (fault.kind == "command_flood") {
     commands_until_us_ = fault.to_us;

@@ -9,9 +9,8 @@
 
 namespace storm {
 
-// From the end of a fault to the first of five good frames in a row. The firmware tries lost sensors
-// again after 1, 2, 4 and then every 8 s (bring_up.h), and a zero that was taken from a wrong
-// temperature is given up after 10 s (condition.h).
+// From the end of a fault to the first of five good frames in a row. The firmware tries lost sensors again after 1, 2, 4 and then every 8 s
+// (bring_up.h), and a zero that was taken from a wrong temperature is given up after 10 s (condition.h).
 constexpr std::uint64_t RECOVERY_LIMIT_us = 20000000;
 
 class Storm {

@@ -176,8 +176,7 @@ TEST(Judge, FindsWhatIsSpoilt) {
          packet.body.contact.force_N = 1;
        },
        "wrong; "},
-      {"a reading", false, false, [](wire_packet &packet) { packet.body.raw.pressure_Pa_q10[3] += 2000 * 1024; },
-       "wrong; "},
+      {"a reading", false, false, [](wire_packet &packet) { packet.body.raw.pressure_Pa_q10[3] += 2000 * 1024; }, "wrong; "},
       {"a location with a warning", true, true,
        [&](wire_packet &packet) {
          off(packet);
@@ -191,8 +190,7 @@ TEST(Judge, FindsWhatIsSpoilt) {
     line.spoil_at_us = each.pressed ? line.pressed_at_us() : 1500000; // nothing touches in the first three seconds
     line.spoil = each.spoil;
     line.run_to(line.spoil_at_us + 100000);
-    EXPECT_EQ(found(line).substr(0, each.finding.empty() ? std::string::npos : each.finding.size()), each.finding)
-        << each.name;
+    EXPECT_EQ(found(line).substr(0, each.finding.empty() ? std::string::npos : each.finding.size()), each.finding) << each.name;
   }
 }
 

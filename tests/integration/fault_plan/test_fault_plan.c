@@ -1,12 +1,10 @@
-/* The whole fingertip on the simulated array, and one fault at every transfer of start-up, of a
- * pressure frame and of a temperature frame. Whatever happens, the stream must come back to
- * complete frames, never hang, and never call a pressure valid that is wrong.
+/* The whole fingertip on the simulated array, and one fault at every transfer of start-up, of a pressure frame and of a temperature frame.
+ * Whatever happens, the stream must come back to complete frames, never hang, and never call a pressure valid that is wrong.
  *
  * The pressure on the pad never rests, so that a stale reading is a wrong one, but where a test says so.
  *
- * One fault is beyond the sensor's protocol: the 24-bit results of conversions carry no check, so
- * bits inverted there go unseen. For these only the return to good frames is demanded: at the next
- * frame, or after the next temperature conversion. */
+ * One fault is beyond the sensor's protocol: the 24-bit results of conversions carry no check, so bits inverted there go unseen. For these
+ * only the return to good frames is demanded: at the next frame, or after the next temperature conversion. */
 #include "common/contact_flags.h"
 #include "unit/app/app_rig.h"
 
@@ -109,8 +107,7 @@ void tearDown(void) { native_cdc_reset(); }
 
 static void complain(const char *what, uint32_t transfer) {
   const size_t length = strlen(problems);
-  snprintf(problems + length, sizeof problems - length, "fault %d at transfer %u: %s; ", (int)array.fault.kind,
-           (unsigned)transfer, what);
+  snprintf(problems + length, sizeof problems - length, "fault %d at transfer %u: %s; ", (int)array.fault.kind, (unsigned)transfer, what);
 }
 
 /* One run with the fault set in array.fault. */
@@ -210,9 +207,8 @@ TEST(test_one_fault_anywhere) {
   }
 }
 
-/* The sensor goes on with another gain, and its reset cures it. What it says in between must be
- * left out from the first frame on; only in the very first frame there is nothing to hold it
- * against. A pad that moves as a whole hides such a step in the pressure. */
+/* The sensor goes on with another gain, and its reset cures it. What it says in between must be left out from the first frame on; only in
+ * the very first frame there is nothing to hold it against. A pad that moves as a whole hides such a step in the pressure. */
 TEST(test_brown_out_of_a_sensor) {
   const struct sim_fault fault = {.kind = SIM_FAULT_BROWN_OUT, .sensor = 7};
   const uint32_t later = place.frame + 5 * (1 + SENSORS);
@@ -243,9 +239,8 @@ TEST(test_wrong_bits_in_a_prom) {
   }
 }
 
-/* NACKs of single reads at random, for 20 s each, by a bus that acknowledges a command as one and
- * does not ask again: two frames each, at most. While the first NACK cost a sensor its admission,
- * the same NACKs left 6.5, 28, 64, 87 and 95 % of the frames incomplete. */
+/* NACKs of single reads at random, for 20 s each, by a bus that acknowledges a command as one and does not ask again: two frames each, at
+ * most. While the first NACK cost a sensor its admission, the same NACKs left 6.5, 28, 64, 87 and 95 % of the frames incomplete. */
 TEST(test_scattered_nacks_cost_two_frames_each) {
   static const double nacks_per_s[] = {0.3, 1, 3, 10, 30};
   static const double incomplete_percent[] = {0.5, 1.2, 3, 11, 29};
@@ -288,10 +283,8 @@ TEST(test_a_sensor_dies) {
     for (uint32_t read = 0; read < 2; read++) {
       power_up();
       seen.expected = ALL & ~(1u << k);
-      array.fault = (struct sim_fault){.kind = SIM_FAULT_DEAD,
-                                       .transfer = place.temperature + (read ? 1 + k : 0),
-                                       .count = UINT32_MAX,
-                                       .sensor = (uint8_t)k};
+      array.fault = (struct sim_fault){
+          .kind = SIM_FAULT_DEAD, .transfer = place.temperature + (read ? 1 + k : 0), .count = UINT32_MAX, .sensor = (uint8_t)k};
       run_to_recovery(false);
     }
   }

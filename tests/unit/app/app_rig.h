@@ -46,8 +46,7 @@ static inline double world_pressure_Pa(void *context, unsigned sensor, uint64_t 
   double dy = (double)geometry.y_mm[sensor] - y_mm;
   const double sigma_mm = 5.7;
   double p0_Pa = press.force_N / (2.0 * PI * sigma_mm * sigma_mm * 1e-6);
-  double pressure_Pa =
-      world_field_Pa ? world_field_Pa(dx, dy, t_us) : p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
+  double pressure_Pa = world_field_Pa ? world_field_Pa(dx, dy, t_us) : p0_Pa * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm));
   return AMBIENT_Pa + (world_gain ? world_gain(sensor) : 1.0) * pressure_Pa;
 }
 
@@ -87,13 +86,9 @@ static inline void rig_start(void) {
   rig_power_up();
 }
 
-static inline void rig_end(void) {
-  TEST_ASSERT_FALSE_MESSAGE(native_watchdog_expired(), "the watchdog would have struck");
-}
+static inline void rig_end(void) { TEST_ASSERT_FALSE_MESSAGE(native_watchdog_expired(), "the watchdog would have struck"); }
 
-static inline enum native_end run_for(uint32_t ms) {
-  return native_run_until(port_now_us() + 1000u * ms, main_round, &app);
-}
+static inline enum native_end run_for(uint32_t ms) { return native_run_until(port_now_us() + 1000u * ms, main_round, &app); }
 
 static inline void send_packet(struct wire_packet *packet) {
   uint8_t frame[WIRE_MAX_FRAME_BYTES];

@@ -43,8 +43,8 @@ TEST(a_press_is_located_and_weighed) {
       TEST_ASSERT_EQUAL_FLOAT(last.x_mm, contact.x_mm);
       TEST_ASSERT_EQUAL_FLOAT(last.force_N, contact.force_N);
     }
-    TEST_ASSERT_EQUAL_UINT16(stages->total_us, stages->convert_us + stages->read_us + stages->queue_us +
-                                                   stages->condition_us + stages->fit_us + stages->contact_us);
+    TEST_ASSERT_EQUAL_UINT16(stages->total_us, stages->convert_us + stages->read_us + stages->queue_us + stages->condition_us +
+                                                   stages->fit_us + stages->contact_us);
     if (!(contact.flags & CONTACT_FLAG_CONTACT)) {
       TEST_ASSERT_EQUAL_FLOAT(0.0f, contact.force_N);
       TEST_ASSERT_TRUE(packet.t_us < press.from_us + 3000);
@@ -54,9 +54,8 @@ TEST(a_press_is_located_and_weighed) {
       continue; /* it begins in no time, which a temperature must confirm */
     }
     in_contact++;
-    TEST_ASSERT_EQUAL_HEX32(
-        CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TARED,
-        contact.flags & ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_HELD));
+    TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TARED,
+                            contact.flags & ~(uint32_t)(CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_HELD));
     TEST_ASSERT_EQUAL_HEX32(0x7FFF, contact.sensors_used);
     /* Noise, and the compensation's own rounding. The standard deviations are far larger: they are
      * those of a pad that was never calibrated, and these sensors happen to be alike. */

@@ -8,10 +8,9 @@ void setUp(void) { rig_start(); }
 
 void tearDown(void) { rig_end(); }
 
-static const uint32_t CAPABILITIES =
-    (FT_WITH_FIT ? WIRE_CAPABILITY_FIT : 0) | (FT_WITH_SLIP ? WIRE_CAPABILITY_SLIP : 0) |
-    (FT_WITH_RAW_STREAM ? WIRE_CAPABILITY_RAW_STREAM : 0) | (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0) |
-    (FT_WITH_SYNC ? WIRE_CAPABILITY_SYNC : 0);
+static const uint32_t CAPABILITIES = (FT_WITH_FIT ? WIRE_CAPABILITY_FIT : 0) | (FT_WITH_SLIP ? WIRE_CAPABILITY_SLIP : 0) |
+                                     (FT_WITH_RAW_STREAM ? WIRE_CAPABILITY_RAW_STREAM : 0) |
+                                     (FT_WITH_TANGENTIAL ? WIRE_CAPABILITY_TANGENTIAL : 0) | (FT_WITH_SYNC ? WIRE_CAPABILITY_SYNC : 0);
 static const uint8_t STREAMS = (FT_WITH_FIT ? WIRE_STREAM_CONTACT : 0) | (FT_WITH_RAW_STREAM ? WIRE_STREAM_RAW : 0);
 
 TEST(it_tells_its_capabilities_and_their_settings_only) {
@@ -43,8 +42,7 @@ TEST(it_refuses_streams_and_commands_that_it_lacks) {
                   {COMMAND(PAD, pad, pad_of_12_mm()), FT_WITH_TANGENTIAL},
                   {{.type = WIRE_CMD_ERASE_PAD}, FT_WITH_TANGENTIAL}};
   for (size_t i = 0; i < sizeof commands / sizeof commands[0]; i++) {
-    TEST_ASSERT_EQUAL_UINT8(commands[i].known ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND,
-                            ask(commands[i].command));
+    TEST_ASSERT_EQUAL_UINT8(commands[i].known ? WIRE_RESULT_DONE : WIRE_RESULT_UNKNOWN_COMMAND, ask(commands[i].command));
   }
 }
 
@@ -113,8 +111,7 @@ TEST(it_keeps_settings) {
   TEST_ASSERT_EQUAL_UINT16(512, info.osr);
   TEST_ASSERT_EQUAL_UINT8(FT_WITH_SYNC ? PORT_SYNC_SECOND : 0, info.sync);
   TEST_ASSERT_EQUAL(FT_WITH_SYNC ? PORT_SYNC_SECOND : PORT_SYNC_OFF, native_sync_mode());
-  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_SETTINGS | (FT_WITH_FIT ? WIRE_STORED_CALIBRATION : 0) |
-                              (FT_WITH_TANGENTIAL ? WIRE_STORED_PAD : 0),
+  TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_SETTINGS | (FT_WITH_FIT ? WIRE_STORED_CALIBRATION : 0) | (FT_WITH_TANGENTIAL ? WIRE_STORED_PAD : 0),
                           info.stored);
   TEST_ASSERT_EQUAL_FLOAT(FT_WITH_TANGENTIAL ? 12.0f : 0.0f, info.pad.thickness_mm);
   TEST_ASSERT_EQUAL_FLOAT(12.0f, app.store.content.profile.thickness_mm);

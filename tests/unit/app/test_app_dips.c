@@ -11,18 +11,15 @@
 enum { PHASES = 16, EVERY = 61, FOLLOWED_ms = 2500, RESET_MAX_ms = 30 };
 
 static const double shares[] = {0.5, 0.7, 0.83, 0.9375, 0.97, 1.03}; /* of the true codes */
-static const uint32_t warnings = CONTACT_FLAG_SENSOR_DOUBTFUL | CONTACT_FLAG_ZERO_DOUBTFUL | CONTACT_FLAG_UNCERTAIN |
-                                 CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT |
-                                 CONTACT_FLAG_LOW_SIGNAL;
+static const uint32_t warnings = CONTACT_FLAG_SENSOR_DOUBTFUL | CONTACT_FLAG_ZERO_DOUBTFUL | CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL |
+                                 CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL;
 
 struct found {
   unsigned cases, wrong_unflagged_frames, false_slips, raw_valid_wrong, reset_ms_max;
 };
 
 static double scale = 1.0; /* of all pressures */
-static double scaled_pressure_Pa(void *context, unsigned sensor, uint64_t t_us) {
-  return scale * world_pressure_Pa(context, sensor, t_us);
-}
+static double scaled_pressure_Pa(void *context, unsigned sensor, uint64_t t_us) { return scale * world_pressure_Pa(context, sensor, t_us); }
 
 static void press_for(double force_N, uint32_t ms) {
   rig_start();
@@ -42,9 +39,8 @@ static bool is_wrong(const struct wire_contact *contact, bool few_are_left) {
   if (!(contact->flags & CONTACT_FLAG_FIT_VALID)) {
     return !(contact->flags & excuses);
   }
-  return !(contact->flags & warnings) &&
-         (fabs((double)contact->force_N - FORCE_N) > 0.1 * FORCE_N ||
-          hypot((double)contact->x_mm - press.x_mm, (double)contact->y_mm - press.y_mm) > 0.6);
+  return !(contact->flags & warnings) && (fabs((double)contact->force_N - FORCE_N) > 0.1 * FORCE_N ||
+                                          hypot((double)contact->x_mm - press.x_mm, (double)contact->y_mm - press.y_mm) > 0.6);
 }
 
 static void dip(unsigned count, unsigned first, uint32_t phase_us, double share, struct found *found) {
@@ -97,10 +93,9 @@ TEST(dips_are_found_and_no_frame_is_wrong_without_a_warning) {
     }
     printf("{\"board\":\"%s\",\"share\":%.4f,\"cases\":%u,\"wrong_unflagged_frames\":%u,\"false_slips\":%u,"
            "\"raw_valid_wrong\":%u,\"reset_ms_max\":%u}\n",
-           i % 2 ? "pico_parallel" : "pico_mux", shares[i / 2], found.cases, found.wrong_unflagged_frames,
-           found.false_slips, found.raw_valid_wrong, found.reset_ms_max);
-    TEST_ASSERT_TRUE(
-        asked || (found.cases > 0 && found.wrong_unflagged_frames + found.false_slips + found.raw_valid_wrong == 0));
+           i % 2 ? "pico_parallel" : "pico_mux", shares[i / 2], found.cases, found.wrong_unflagged_frames, found.false_slips,
+           found.raw_valid_wrong, found.reset_ms_max);
+    TEST_ASSERT_TRUE(asked || (found.cases > 0 && found.wrong_unflagged_frames + found.false_slips + found.raw_valid_wrong == 0));
     TEST_ASSERT_TRUE(asked || found.reset_ms_max <= RESET_MAX_ms);
   }
 }
@@ -111,8 +106,7 @@ TEST(an_array_of_another_range_is_not_trusted) {
   press_for(20.0, 2500);
   unsigned trusted = 0, frames = 0;
   for (struct wire_packet p; next_of_type(WIRE_CONTACT, &p); frames++) {
-    trusted +=
-        (p.body.contact.flags & (CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_SENSOR_DOUBTFUL)) == CONTACT_FLAG_FIT_VALID;
+    trusted += (p.body.contact.flags & (CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_SENSOR_DOUBTFUL)) == CONTACT_FLAG_FIT_VALID;
   }
   printf("{\"wrong_range_frames\":%u,\"wrong_range_trusted\":%u}\n", frames, trusted);
   TEST_ASSERT_EQUAL(0, trusted);

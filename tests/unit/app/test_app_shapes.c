@@ -13,8 +13,7 @@ static unsigned object_count;
 static double load_qx_N;
 static uint64_t ends_us; /* 0: never */
 
-static const uint32_t SHAPES =
-    CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS | CONTACT_FLAG_EDGE | CONTACT_FLAG_SHAPE_UNKNOWN;
+static const uint32_t SHAPES = CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS | CONTACT_FLAG_EDGE | CONTACT_FLAG_SHAPE_UNKNOWN;
 
 /* x and y count from the middle of the pad. */
 static double field_Pa(double x_mm, double y_mm, uint64_t t_us) {
@@ -23,15 +22,12 @@ static double field_Pa(double x_mm, double y_mm, uint64_t t_us) {
   const bool is_away = ends_us != 0 && t_us >= ends_us && t_us < ends_us + 100000;
   for (unsigned i = 0; i < object_count && !is_away; i++) {
     const struct object *object = &objects[i];
-    sum_Pa += pad_pressure_Pa(&pad, 4.0, x_mm - object->x_mm, y_mm - object->y_mm,
-                              (struct pad_load){object->force_N, load_qx_N, 0.0});
+    sum_Pa += pad_pressure_Pa(&pad, 4.0, x_mm - object->x_mm, y_mm - object->y_mm, (struct pad_load){object->force_N, load_qx_N, 0.0});
   }
   return sum_Pa;
 }
 
-static void put(double x_mm, double y_mm, double force_N) {
-  objects[object_count++] = (struct object){x_mm, y_mm, force_N};
-}
+static void put(double x_mm, double y_mm, double force_N) { objects[object_count++] = (struct object){x_mm, y_mm, force_N}; }
 
 void setUp(void) {
   rig_start();
@@ -139,8 +135,7 @@ TEST(a_long_contact_doubts_its_place_by_what_its_line_has) {
   TEST_ASSERT_FLOAT_WITHIN(0.4f, 5.0f, app.found.fit.x_mm + app.stages.shapes.report.from_fit_x_mm);
   TEST_ASSERT_FLOAT_WITHIN(0.4f, -13.0f, app.found.fit.y_mm + app.stages.shapes.report.from_fit_y_mm);
   TEST_ASSERT_TRUE(contact.location_sd_mm > 0.7f * off_mm);
-  TEST_ASSERT_TRUE(contact.location_sd_mm >
-                   hypotf(app.stages.shapes.report.from_fit_x_mm, app.stages.shapes.report.from_fit_y_mm));
+  TEST_ASSERT_TRUE(contact.location_sd_mm > hypotf(app.stages.shapes.report.from_fit_x_mm, app.stages.shapes.report.from_fit_y_mm));
 }
 
 /* Noise makes one pull of six look like a short line (two.json: round, Q/F 0.3). */
@@ -167,8 +162,7 @@ TEST(one_contact_is_one_with_a_load_or_without) {
   app.found.frame.t_us += 3700;
   app_process_frame(&app, app.found.frame.t_read_us);
   TEST_ASSERT_TRUE(app.stages.tangential.job.estimate.valid);
-  TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS,
-                   app.found.contact.flags);
+  TEST_ASSERT_BITS(SHAPES | CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS, app.found.contact.flags);
 }
 
 TEST(what_is_none_of_these_is_warned_of_all_the_time) {

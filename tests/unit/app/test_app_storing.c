@@ -11,8 +11,8 @@ static uint8_t keep(uint8_t what) { return ask(COMMAND(KEEP, keep, what)); }
 static double gain_of_calibration(unsigned sensor) { return 0.8 + 0.02 * (double)sensor; }
 
 static struct wire_packet calibrate_gains(void) {
-  struct wire_packet command = calibrate_command(
-      (struct calibration){.date_s = 1785931200, .placements = 30, .force_scale = 1.0f, .force_scale_sd = 0.01f});
+  struct wire_packet command =
+      calibrate_command((struct calibration){.date_s = 1785931200, .placements = 30, .force_scale = 1.0f, .force_scale_sd = 0.01f});
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     command.body.cmd_calibrate.calibration.sensors[k].gain = (float)gain_of_calibration(k);
   }
@@ -179,8 +179,7 @@ TEST(after_a_tare_no_frame_says_tared_before_it_is) {
     TEST_ASSERT_TRUE(next_of_type(WIRE_ACK, &packet));
     TEST_ASSERT_TRUE(next_of_type(WIRE_CONTACT, &packet));
     held += (packet.body.contact.flags & CONTACT_FLAG_HELD) != 0;
-    TEST_ASSERT_EQUAL_HEX32(0, packet.body.contact.flags &
-                                   (CONTACT_FLAG_TARED | CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID));
+    TEST_ASSERT_EQUAL_HEX32(0, packet.body.contact.flags & (CONTACT_FLAG_TARED | CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID));
   }
   TEST_ASSERT_GREATER_THAN(0, held);
 }

@@ -53,8 +53,8 @@ static struct wire_contact last_contact(uint64_t from_us, uint64_t t_us, uint32_
       TEST_ASSERT_BITS_HIGH(high, last.flags);
       TEST_ASSERT_BITS_LOW(low, last.flags);
       const struct wire_stages *stages = &last.stages;
-      TEST_ASSERT_EQUAL_UINT16(stages->convert_us + stages->read_us + stages->queue_us + stages->condition_us +
-                                   stages->fit_us + stages->contact_us,
+      TEST_ASSERT_EQUAL_UINT16(stages->convert_us + stages->read_us + stages->queue_us + stages->condition_us + stages->fit_us +
+                                   stages->contact_us,
                                stages->total_us);
       count++;
     }
@@ -70,8 +70,7 @@ TEST(a_profile_tells_the_load_and_corrects_the_location) {
   load.qx_N = 1.2;
   load.qy_N = -0.9;
   store_pad();
-  struct wire_contact contact =
-      last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_FROM_TOUCH);
+  struct wire_contact contact = last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_FROM_TOUCH);
   TEST_ASSERT_FLOAT_WITHIN(0.15f, 1.2f, contact.qx_N);
   TEST_ASSERT_FLOAT_WITHIN(0.15f, -0.9f, contact.qy_N);
   TEST_ASSERT_FLOAT_WITHIN(0.03f, 0.3f, contact.tangential_ratio);
@@ -110,8 +109,7 @@ TEST(a_load_that_is_not_estimated_is_part_of_the_error) {
     unsigned frames = 0;
     for (struct wire_packet packet; next_packet(&packet);) {
       const struct wire_contact *contact = &packet.body.contact;
-      if (packet.type != WIRE_CONTACT ||
-          (contact->flags & (CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_HELD)) != CONTACT_FLAG_FIT_VALID) {
+      if (packet.type != WIRE_CONTACT || (contact->flags & (CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_HELD)) != CONTACT_FLAG_FIT_VALID) {
         continue;
       }
       frames++;
@@ -170,8 +168,8 @@ TEST(a_profile_outlives_power_until_it_is_erased) {
 /* The Gaussian is where the estimate begins, and what is left where there is none. */
 TEST(beside_a_profile_the_fit_has_the_dip_and_assumes_no_width) {
   connect_for(300);
-  obey(calibrate_command((struct calibration){
-      .force_scale = 1.0f, .sigma_um = 5552, .sigma_sd_um = 60, .dip_share_q16 = 3277, .dip_sd_um = 13954}));
+  obey(calibrate_command(
+      (struct calibration){.force_scale = 1.0f, .sigma_um = 5552, .sigma_sd_um = 60, .dip_share_q16 = 3277, .dip_sd_um = 13954}));
   store_pad();
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.stages.location.settings.prior_width_mm);
   TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.stages.location.settings.dip_share);
@@ -209,8 +207,7 @@ TEST(a_calibration_and_the_scale_of_the_profile_act) {
   pad.tangential_scale = 1.5f;
   store_pad();
   obey(calibrate_command((struct calibration){.placements = 20, .force_scale = 1.25f}));
-  struct wire_contact contact =
-      last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_CALIBRATED, 0);
+  struct wire_contact contact = last_contact(1600000, 1800000, CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_CALIBRATED, 0);
   const float scale = 1.25f * pad.force_ratio;
   TEST_ASSERT_FLOAT_WITHIN(0.2f, scale * 5.0f, contact.force_N);
   TEST_ASSERT_FLOAT_WITHIN(0.2f, 1.5f * scale * 1.2f, contact.qx_N);
@@ -257,8 +254,7 @@ TEST(a_held_frame_repeats_the_load) {
   TEST_ASSERT_GREATER_THAN(0, held);
 }
 
-/* Frames of our own, so near to each other that none waits: the last one again, its pressures above
- * the zero in this share of it. */
+/* Frames of our own, so near to each other that none waits: the last one again, its pressures above the zero in this share of it. */
 static void feed_fast(double share) {
   static struct frame first;
   if (share == 0.0) {

@@ -1,5 +1,4 @@
-/* Ends of counters: the same second of the world is felt whatever the clock shows, and whatever the
- * counters have come to. */
+/* Ends of counters: the same second of the world is felt whatever the clock shows, and whatever the counters have come to. */
 #include "app_rig.h"
 #include "common/contact_flags.h"
 #include "support/pad.h"
@@ -53,12 +52,8 @@ static void tell(struct told *told, const struct start *start, struct wire_packe
   packet->sequence = (uint16_t)(packet->sequence - start->count);
   packet->t_us -= start->t_us;
   switch (packet->type) {
-  case WIRE_CONTACT:
-    packet->body.contact.frame -= start->count;
-    break;
-  case WIRE_RAW:
-    packet->body.raw.frame -= start->count;
-    break;
+  case WIRE_CONTACT: packet->body.contact.frame -= start->count; break;
+  case WIRE_RAW: packet->body.raw.frame -= start->count; break;
   case WIRE_HEALTH:
     packet->body.health.uptime_s -= start->count;
     packet->body.health.frames -= start->count;
@@ -66,8 +61,7 @@ static void tell(struct told *told, const struct start *start, struct wire_packe
     packet->body.health.commands_done -= start->count;
     packet->body.health.bus_nacks -= start->count;
     break;
-  default:
-    break;
+  default: break;
   }
   told->packets[told->count++] = *packet;
 }
@@ -111,8 +105,8 @@ static void check(uint64_t crossing_us, uint32_t count) {
     }
   }
   /* All that has a memory of times took part. */
-  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TARED | CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_HELD |
-                            CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_SLIDING,
+  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_TARED | CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_HELD | CONTACT_FLAG_TANGENTIAL_VALID |
+                            CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_SLIDING,
                         flags);
 }
 

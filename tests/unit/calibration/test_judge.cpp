@@ -97,13 +97,11 @@ TEST(Judge, names_a_sensor_that_measures_nothing) {
     for (Placement &placement : placements) {
       placement.reading_Pa[seed % 15] = 0.0;
     }
-    expect_refused(judge(pad.array, placements, true), Reason::silent,
-                   "sensors " + std::to_string(seed % 15) + " measured nothing");
+    expect_refused(judge(pad.array, placements, true), Reason::silent, "sensors " + std::to_string(seed % 15) + " measured nothing");
   }
 }
 
-/* Saturated wherever it has a load: a reading that is no measurement, as the finder leaves it, is not one of nothing.
- */
+/* Saturated wherever it has a load: a reading that is no measurement, as the finder leaves it, is not one of nothing. */
 TEST(Judge, does_not_take_what_a_sensor_missed_for_nothing) {
   for (std::uint64_t seed = 62; seed < 72; seed++) {
     const KnownPad pad(seed);
@@ -125,8 +123,7 @@ TEST(Judge, asks_for_more_until_it_is_good) {
   std::size_t count = 0;
   while (state == State::more && count < placements.size()) {
     count++;
-    const Judgement judgement =
-        judge(pad.array, {placements.begin(), placements.begin() + std::ptrdiff_t(count)}, false);
+    const Judgement judgement = judge(pad.array, {placements.begin(), placements.begin() + std::ptrdiff_t(count)}, false);
     state = judgement.state;
     EXPECT_EQ(state == State::more, !judgement.unsure.empty() || count < PLACEMENTS_WANTED);
   }

@@ -13,12 +13,10 @@ constexpr double AMBIENT_Pa = 101325.0;
 
 /* A stretch of time: what the sensors feel at its times. */
 struct Feed {
-  explicit Feed(double frames_per_s = 200.0, double frame_noise_Pa = 4.0)
-      : rate_Hz(frames_per_s), noise_Pa(frame_noise_Pa) {}
+  explicit Feed(double frames_per_s = 200.0, double frame_noise_Pa = 4.0) : rate_Hz(frames_per_s), noise_Pa(frame_noise_Pa) {}
 
   /* force(t) of the usual one at a place(t), t from the beginning of this stretch. */
-  void run(double seconds, const std::function<double(double)> &force,
-           const std::function<std::pair<double, double>(double)> &place = {}) {
+  void run(double seconds, const std::function<double(double)> &force, const std::function<std::pair<double, double>(double)> &place = {}) {
     for (const double end_s = t_s + seconds; t_s < end_s; t_s += 1.0 / rate_Hz) {
       const double t = t_s - (end_s - seconds);
       const auto [x, y] = place ? place(t) : std::pair<double, double>{2.0, 3.0};
@@ -27,8 +25,7 @@ struct Feed {
       frame.valid = valid;
       for (std::size_t k = 0; k < 15; k++) {
         const double felt_Pa = force(t) * pad.gain[k] * pad.base_Pa({x, y}, k);
-        frame.pressure_Pa.push_back(AMBIENT_Pa + 10.0 * static_cast<double>(k) + drift_Pa_s * t_s + felt_Pa +
-                                    noise_Pa * random.normal());
+        frame.pressure_Pa.push_back(AMBIENT_Pa + 10.0 * static_cast<double>(k) + drift_Pa_s * t_s + felt_Pa + noise_Pa * random.normal());
         frame.zero_Pa.push_back(AMBIENT_Pa + 10.0 * static_cast<double>(k) + zero_off_Pa);
       }
       if (auto placement = finder.take(frame)) {
@@ -74,8 +71,7 @@ struct Feed {
 };
 
 TEST(Placements, are_found_at_any_rate_and_noise) {
-  for (const auto &[rate_Hz, noise_Pa] :
-       {std::pair{13.0, 2.0}, {20.0, 11.0}, {57.0, 2.0}, {315.0, 11.0}, {1308.0, 11.0}}) {
+  for (const auto &[rate_Hz, noise_Pa] : {std::pair{13.0, 2.0}, {20.0, 11.0}, {57.0, 2.0}, {315.0, 11.0}, {1308.0, 11.0}}) {
     Feed feed(rate_Hz, noise_Pa);
     feed.rest(1.0);
     for (int i = 0; i < 5; i++) {

@@ -174,20 +174,18 @@ TEST(PullJudgement, IsGoodWithEnoughPullsThatAgree) {
 }
 
 TEST(PullJudgement, LeavesAStrayPullOut) {
-  const PullJudgement judgement =
-      judge_pulls(pulls_that_read(10, [](std::size_t i) { return i == 3 ? 0.5 : 0.9; }), KNOWN_N, false);
+  const PullJudgement judgement = judge_pulls(pulls_that_read(10, [](std::size_t i) { return i == 3 ? 0.5 : 0.9; }), KNOWN_N, false);
   EXPECT_EQ(judgement.state, PullJudgement::State::good) << judgement.text;
   EXPECT_EQ(judgement.kept, 9u);
   EXPECT_NEAR(judgement.reading, 0.9, 1e-9);
 }
 
 TEST(PullJudgement, RefusesWhatDoesNotAgree) {
-  const PullJudgement weights = judge_pulls(
-      pulls_that_read(12, [](std::size_t i) { return 0.6 + 0.06 * static_cast<double>(i); }), KNOWN_N, false);
+  const PullJudgement weights =
+      judge_pulls(pulls_that_read(12, [](std::size_t i) { return 0.6 + 0.06 * static_cast<double>(i); }), KNOWN_N, false);
   EXPECT_EQ(weights.state, PullJudgement::State::refused);
   EXPECT_NE(weights.text.find("use one and the same weight"), std::string::npos) << weights.text;
-  const PullJudgement ways =
-      judge_pulls(pulls_that_read(12, [](std::size_t i) { return i % 2 ? 0.9 : 1.03; }), KNOWN_N, false);
+  const PullJudgement ways = judge_pulls(pulls_that_read(12, [](std::size_t i) { return i % 2 ? 0.9 : 1.03; }), KNOWN_N, false);
   EXPECT_EQ(ways.state, PullJudgement::State::refused);
   EXPECT_NE(ways.text.find("directions disagree"), std::string::npos) << ways.text;
 }

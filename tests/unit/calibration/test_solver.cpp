@@ -111,12 +111,10 @@ TEST(Solver, finds_the_gaussian_and_the_dip_of_the_firmware) {
   EXPECT_LT(least, left(s.sigma_mm * 0.98));
 }
 
-/* Far from a contact on a wide layer it presses a little. That is found as zeros that were off and
- * a wide dip, which together are none. */
+/* Far from a contact on a wide layer it presses a little. That is found as zeros that were off and a wide dip, which together are none. */
 TEST(Solver, what_presses_far_away_makes_no_dip) {
   const KnownPad pad(6);
-  const Solution s =
-      solve_presses(pad, [](double r_mm) { return layer(r_mm, 5.9) + 0.005 * (1.0 - bell(r_mm, 20.0)); });
+  const Solution s = solve_presses(pad, [](double r_mm) { return layer(r_mm, 5.9) + 0.005 * (1.0 - bell(r_mm, 20.0)); });
   ASSERT_TRUE(s.solved);
   EXPECT_GT(s.dip, 0.003);
   EXPECT_LT(s.dip_share, 0.001);
@@ -167,8 +165,7 @@ TEST(Solver, own_widths_are_found_and_pass_for_no_gains) {
       for (std::size_t k = 0; k < 15; k++) {
         along += s.own_width[k] * pad.own_width[k];
         square += pad.own_width[k] * pad.own_width[k];
-        const double reading_off =
-            std::abs(std::log(s.gain[k] / pad.gain[k]) + OWN_WIDTH_SQUARE * (s.own_width[k] - pad.own_width[k]));
+        const double reading_off = std::abs(std::log(s.gain[k] / pad.gain[k]) + OWN_WIDTH_SQUARE * (s.own_width[k] - pad.own_width[k]));
         readings_within_one += reading_off < s.reading_sd[k];
       }
       if (spread > 0.0) {
@@ -263,8 +260,7 @@ TEST(Solver, finds_what_remains_of_the_placements_before) {
   }
 }
 
-/* A pad aslant: a tangential force that all placements share. The bump is no layer: its pull passes in part for places.
- */
+/* A pad aslant: a tangential force that all placements share. The bump is no layer: its pull passes in part for places. */
 TEST(Solver, distinguishes_a_slope_from_gains) {
   const KnownPad pad(12);
   constexpr double SLOPE = 0.17;

@@ -23,8 +23,7 @@ static KindOfGrasp held(Shape shape, double mass_kg, double friction) {
 
 // That squeezes with this force.
 static double width_mm(const KindOfGrasp &grasp, double force_N) {
-  const double each_mm =
-      std::pow(force_N / grasp.pads[0].at_1_mm_N, 1.0 / grasp.exponent) + 0.5 * force_N / Cell::FINGERS_N_mm;
+  const double each_mm = std::pow(force_N / grasp.pads[0].at_1_mm_N, 1.0 / grasp.exponent) + 0.5 * force_N / Cell::FINGERS_N_mm;
   return grasp.width_mm - 2.0 * each_mm;
 }
 
@@ -168,8 +167,8 @@ TEST(Cell, TouchesInAPointALineOrAnArea) {
     Shape shape;
     double length_mm, width_mm; // level, upwards; pads are 36 by 54 mm
   };
-  for (const Case &one : {Case{Shape::ball, 0, 0}, Case{Shape::egg, 0, 0}, Case{Shape::lying, 30, 0},
-                          Case{Shape::upright, 0, 30}, Case{Shape::cup, 0, 30}, Case{Shape::box, 24, 30}}) {
+  for (const Case &one : {Case{Shape::ball, 0, 0}, Case{Shape::egg, 0, 0}, Case{Shape::lying, 30, 0}, Case{Shape::upright, 0, 30},
+                          Case{Shape::cup, 0, 30}, Case{Shape::box, 24, 30}}) {
     KindOfGrasp grasp = held(one.shape, 0.1, 0.5);
     grasp.height_mm = 30.0;
     grasp.depth_mm = 24.0;

@@ -20,10 +20,7 @@ TEST(Kinds, EventsAddUp) {
   grasp.lift_mm = 8.0;
   grasp.mass_kg = 0.5;
   using Kind = Event::Kind;
-  grasp.events = {{Kind::pour, 1.0, 1.0, 0.8},
-                  {Kind::slick, 3.0, 0.5, 0.25},
-                  {Kind::jerk, 4.0, 0.4, 6.0},
-                  {Kind::knock, 5.0, 0.02, 0.1}};
+  grasp.events = {{Kind::pour, 1.0, 1.0, 0.8}, {Kind::slick, 3.0, 0.5, 0.25}, {Kind::jerk, 4.0, 0.4, 6.0}, {Kind::knock, 5.0, 0.02, 0.1}};
   EXPECT_NEAR(grasp.least_N(0.9), 0.5 * 9.81, 1e-9);
   EXPECT_NEAR(grasp.least_N(2.5), 0.9 * 9.81, 1e-9);
   EXPECT_NEAR(grasp.least_N(3.8), 0.9 * 9.81 / 0.75, 1e-9);
@@ -201,8 +198,7 @@ TEST(TrialFault, FingertipsFailFromThenOn) {
     EXPECT_EQ(failed.state, GRIP_HOLDING);
     auto late = controller.touches;
     for (auto &touches : late) {
-      touches.erase(std::remove_if(touches.begin(), touches.end(), [](const auto &touch) { return touch.t_s < 1.61; }),
-                    touches.end());
+      touches.erase(std::remove_if(touches.begin(), touches.end(), [](const auto &touch) { return touch.t_s < 1.61; }), touches.end());
     }
     EXPECT_GT(controller.touches[0].size(), 500U);
     EXPECT_EQ(late[0].size() > 300U, kind != Kind::gone);
@@ -228,9 +224,8 @@ TEST(TrialFault, TheLineFailsFromThenOn) {
     int fault;
   };
   int well = 0, silent = 0;
-  for (const Case &one :
-       {Case{Kind::none, true, true, 0}, Case{Kind::silent, false, true, 0}, Case{Kind::unanswered, true, true, 0},
-        Case{Kind::late, true, true, 0}, Case{Kind::fault, false, true, 9}, Case{Kind::power, false, false, 0}}) {
+  for (const Case &one : {Case{Kind::none, true, true, 0}, Case{Kind::silent, false, true, 0}, Case{Kind::unanswered, true, true, 0},
+                          Case{Kind::late, true, true, 0}, Case{Kind::fault, false, true, 9}, Case{Kind::power, false, false, 0}}) {
     const KindTrial trial = failing(one.kind);
     ClosesTo controller(width_mm(trial, 4.0), width_mm(trial, 4.0) - 1.0);
     EXPECT_EQ(run_kind(trial, controller).peak_N > 4.5, one.moves) << static_cast<int>(one.kind);

@@ -89,13 +89,8 @@ struct range {
 static void assert_ranges(const struct range *ranges, size_t count, bool (*is_valid)(void)) {
   for (size_t i = 0; i < count; i++) {
     const float was = *ranges[i].value;
-    const float values[] = {ranges[i].least,
-                            ranges[i].greatest,
-                            ranges[i].least - 1e-3f,
-                            ranges[i].greatest * 1.001f,
-                            -INFINITY,
-                            INFINITY,
-                            NAN};
+    const float values[] = {
+        ranges[i].least, ranges[i].greatest, ranges[i].least - 1e-3f, ranges[i].greatest * 1.001f, -INFINITY, INFINITY, NAN};
     for (size_t j = 0; j < sizeof values / sizeof values[0]; j++) {
       *ranges[i].value = values[j];
       TEST_ASSERT_EQUAL(j < 2, is_valid());
@@ -120,9 +115,8 @@ TEST(test_calibrations_are_in_their_ranges) {
   const struct {
     int16_t *value;
     int16_t greatest;
-  } both_sides[] = {{&calibration.sensors[0].off_x_um, 2000},
-                    {&calibration.sensors[14].off_y_um, 2000},
-                    {&calibration.sensors[7].wider_q15, 9830}};
+  } both_sides[] = {
+      {&calibration.sensors[0].off_x_um, 2000}, {&calibration.sensors[14].off_y_um, 2000}, {&calibration.sensors[7].wider_q15, 9830}};
   for (size_t i = 0; i < sizeof both_sides / sizeof both_sides[0]; i++) {
     for (int side = -1; side <= 1; side += 2) {
       *both_sides[i].value = (int16_t)(side * both_sides[i].greatest);

@@ -1,5 +1,4 @@
-/* Fifteen sensors under a pad, frame by frame, for the tests of condition/. setUp begins at 206
- * frames a second, untared. */
+/* Fifteen sensors under a pad, frame by frame, for the tests of condition/. setUp begins at 206 frames a second, untared. */
 #pragma once
 
 #include "condition/condition.h"

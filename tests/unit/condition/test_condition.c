@@ -99,8 +99,7 @@ TEST(test_gains_act_on_what_is_above_zero) {
     for (int k = 0; k < FT_MAX_SENSORS; k++) {
       gains.inverse_q16[k] = k == 7 ? inverses_q16[i] : 65536;
     }
-    static const int32_t above[] = {0,        1,         -1,          1023,        -1025,
-                                    12345678, -98765432, 200000 * Pa, -90000 * Pa, 524288 * Pa - 1};
+    static const int32_t above[] = {0, 1, -1, 1023, -1025, 12345678, -98765432, 200000 * Pa, -90000 * Pa, 524288 * Pa - 1};
     for (size_t j = 0; j < sizeof above / sizeof above[0]; j++) {
       setUp();
       run(17);
@@ -122,9 +121,7 @@ TEST(test_gains_act_on_what_is_above_zero) {
   }
 }
 
-static void assert_condition_is(const struct condition *expected) {
-  TEST_ASSERT_EQUAL_MEMORY(expected, &condition, sizeof condition);
-}
+static void assert_condition_is(const struct condition *expected) { TEST_ASSERT_EQUAL_MEMORY(expected, &condition, sizeof condition); }
 
 /* The zeros that an answer is sent with are those it was measured from. */
 TEST(test_what_the_answer_does_not_need_can_wait) {

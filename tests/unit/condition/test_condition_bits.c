@@ -61,12 +61,8 @@ static void draw_frame(int32_t period_us) {
 }
 
 static uint32_t with_frame(uint32_t crc) {
-  uint32_t words[7 + 2 * SENSORS] = {crc,
-                                     conditioned.usable,
-                                     conditioned.tared,
-                                     conditioned.contact,
-                                     conditioned.zero_doubtful,
-                                     (uint32_t)conditioned.peak_Pa_q10};
+  uint32_t words[7 + 2 * SENSORS] = {
+      crc, conditioned.usable, conditioned.tared, conditioned.contact, conditioned.zero_doubtful, (uint32_t)conditioned.peak_Pa_q10};
   memcpy(&words[7], conditioned.pressure_Pa_q10, SENSORS * sizeof words[0]);
   memcpy(&words[7 + SENSORS], condition.past_sd_Pa_q10, SENSORS * sizeof words[0]);
   return crc32_iso_hdlc((const uint8_t *)words, sizeof words);

@@ -222,8 +222,7 @@ TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
     TEST_ASSERT_EQUAL(0, condition.past_sd_Pa_q10[7]);
     press(20000 * Pa);
     run_s(3);
-    TEST_ASSERT_INT32_WITHIN(30 * Pa, (int32_t)(0.02f * 20000 * (1.0f - expf(-1.0f))) * Pa,
-                             condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_INT32_WITHIN(30 * Pa, (int32_t)(0.02f * 20000 * (1.0f - expf(-1.0f))) * Pa, condition.past_sd_Pa_q10[7]);
     press(0);
     frame.pressure_Pa_q10[1] += 20000 * Pa; /* the contact moves on */
     run_s(0.2f);

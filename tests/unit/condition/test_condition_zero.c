@@ -323,8 +323,7 @@ TEST(test_another_sensor_is_tared_anew) {
   TEST_ASSERT_EQUAL_INT32(0, conditioned.pressure_Pa_q10[4]);
 }
 
-/* Its supply dipped while the zero was taken, which is found out when it has been reset. A zero
- * from long before is its own. */
+/* Its supply dipped while the zero was taken, which is found out when it has been reset. A zero from long before is its own. */
 TEST(test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew) {
   for (int late = 0; late <= 1; late++) {
     begin(4854);

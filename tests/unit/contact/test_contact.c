@@ -148,8 +148,8 @@ TEST(test_a_location_that_noise_moves_ends_the_history) {
 }
 
 TEST(test_other_warnings_keep_the_history) {
-  static const uint32_t warnings[] = {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_MODEL, CONTACT_FLAG_SENSOR_MASKED,
-                                      CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_ELONGATED};
+  static const uint32_t warnings[] = {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_MODEL, CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_UNCERTAIN,
+                                      CONTACT_FLAG_ELONGATED};
   for (size_t i = 0; i < sizeof warnings / sizeof warnings[0]; i++) {
     setUp();
     fill_history();

@@ -1,6 +1,5 @@
-/* Judging contacts to the bit: slip, tangential load and motion of contacts by chance, which rest,
- * creep, slide, are pulled and let go. What changes a result was meant to, or is a mistake; where
- * it was meant, the test says what to put here. */
+/* Judging contacts to the bit: slip, tangential load and motion of contacts by chance, which rest, creep, slide, are pulled and let go.
+ * What changes a result was meant to, or is a mistake; where it was meant, the test says what to put here. */
 #include "common/contact_flags.h"
 #include "contact/contact.h"
 #include "contact/motion.h"
@@ -116,8 +115,8 @@ static void draw_frame(int32_t period_us) {
   fit.location_noise_mm = ONE_IN(40) ? between(0.0f, 0.4f) : course.noise_mm;
   fit.used = ONE_IN(80) ? draw() & 0x7FFF : 0x7FFF;
   fit.flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
-  fit.flags |= ONE_IN(40) ? draw() & (CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT | CONTACT_FLAG_UNCERTAIN |
-                                      CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_ELONGATED)
+  fit.flags |= ONE_IN(40) ? draw() & (CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT | CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL |
+                                      CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_ELONGATED)
                           : 0;
   fit.flags &= ONE_IN(100) ? 0u : UINT32_MAX;
 }

@@ -114,11 +114,11 @@ TEST(a_slide_is_what_the_load_does_not_explain) {
     } phases[3];
   } cases[] = {
       {0, 1.0f, {{0.1f, 20.0f, 4.0f, 0}, {0.5f, 0, 0, 0}, {0.1f, -20.0f, -4.0f, 0}}}, /* creeping, and back */
-      {0, 0.4f, {{0.1f, 20.0f, 4.0f, 1}}},                         /* the load is less than it seems */
-      {2.0f, 1.0f, {{0.007f, 20.0f, 0, 0}, {0.02f, 20.0f, 0, 1}}}, /* moving on under a steady load */
-      {2.0f, 1.0f, {{0.013f, 10.0f, -4.0f, 1}}},                   /* sooner as friction falls */
-      {0, 1.0f, {{0.06f, 40.0f, 8.0f, 0}, {0.02f, 20.0f, 0, 1}}},  /* after a lift */
-      {2.0f, 1.0f, {{0.08f, 2.0f, 0, 0}, {0.2f, 2.0f, 0, 1}}},     /* slowly */
+      {0, 0.4f, {{0.1f, 20.0f, 4.0f, 1}}},                                            /* the load is less than it seems */
+      {2.0f, 1.0f, {{0.007f, 20.0f, 0, 0}, {0.02f, 20.0f, 0, 1}}},                    /* moving on under a steady load */
+      {2.0f, 1.0f, {{0.013f, 10.0f, -4.0f, 1}}},                                      /* sooner as friction falls */
+      {0, 1.0f, {{0.06f, 40.0f, 8.0f, 0}, {0.02f, 20.0f, 0, 1}}},                     /* after a lift */
+      {2.0f, 1.0f, {{0.08f, 2.0f, 0, 0}, {0.2f, 2.0f, 0, 1}}},                        /* slowly */
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
     setUp();
@@ -126,8 +126,7 @@ TEST(a_slide_is_what_the_load_does_not_explain) {
     settings.tangential_scale = cases[i].scale;
     rest(0.4f);
     for (size_t k = 0; k < 3; k++) {
-      const uint32_t said =
-          go(cases[i].phases[k].seconds, cases[i].phases[k].vx_mm_s, 0, cases[i].phases[k].load_per_s);
+      const uint32_t said = go(cases[i].phases[k].seconds, cases[i].phases[k].vx_mm_s, 0, cases[i].phases[k].load_per_s);
       TEST_ASSERT_EQUAL(cases[i].phases[k].slides, (said & CONTACT_FLAG_SLIDING) != 0);
       TEST_ASSERT_TRUE(i + k > 0 || said == (CONTACT_FLAG_VELOCITY_VALID | CONTACT_FLAG_MOVING));
     }
@@ -200,17 +199,10 @@ TEST(what_interrupts_a_contact_starts_anew) {
       TEST_ASSERT_EQUAL_HEX32(0, update());
       input.zero_doubtful = false;
       break;
-    case 2:
-      input.t_us += MOTION_PAUSE_us;
-      break;
-    case 3: /* time goes back */
-      input.t_us -= 10 * interval_us;
-      break;
-    case 4: /* or stands */
-      input.t_us -= interval_us;
-      break;
-    default:
-      fit.used = 0x7FFE;
+    case 2: input.t_us += MOTION_PAUSE_us; break;
+    case 3: /* time goes back */ input.t_us -= 10 * interval_us; break;
+    case 4: /* or stands */ input.t_us -= interval_us; break;
+    default: fit.used = 0x7FFE;
     }
     found.x_mm += 3.0f; /* elsewhere */
     TEST_ASSERT_EQUAL_HEX32(0, update());

@@ -1,5 +1,4 @@
-/* The one place of a contact: the Gaussian's, the load's or its shape's. And how much of the work
- * on shapes a frame has time for. */
+/* The one place of a contact: the Gaussian's, the load's or its shape's. And how much of the work on shapes a frame has time for. */
 #include "contact/shapes.h"
 #include "support/unit.h"
 

@@ -48,9 +48,7 @@ static uint64_t at_20_Hz_with_jitter(struct random *random, int i) {
   return 7000000u + 50000u * (uint64_t)i - 8000u + random_below(random, 16001);
 }
 
-static uint64_t at_200_Hz_with_jitter(struct random *random, int i) {
-  return 5000u * (uint64_t)i + random_below(random, 1000);
-}
+static uint64_t at_200_Hz_with_jitter(struct random *random, int i) { return 5000u * (uint64_t)i + random_below(random, 1000); }
 
 static uint64_t at_5_Hz(struct random *random, int i) {
   (void)random;
@@ -107,8 +105,8 @@ TEST(test_sums_stay_exact) {
   float distance_mm;
   for (int i = 0; i < 1200000; i++) {
     t_us += 300 + random_below(&random, 3000);
-    slip_update(&history, t_us, (float)random_between(&random, -800.0, 800.0),
-                (float)random_between(&random, -800.0, 800.0), WINDOW_us, &distance_mm);
+    slip_update(&history, t_us, (float)random_between(&random, -800.0, 800.0), (float)random_between(&random, -800.0, 800.0), WINDOW_us,
+                &distance_mm);
   }
   int64_t x_sum = 0;
   int64_t y_sum = 0;

@@ -87,8 +87,7 @@ TEST(Crash, InWords) {
             "a panic at fit_frame+0x0 (0x20001000), in the main loop, fitting, 4 min after its "
             "start");
 
-  EXPECT_EQ(crash_text(with_places(record_of(CRASH_OVERFLOW), symbols)).substr(0, 37),
-            "the stack overflowed at fit_frame+0x0");
+  EXPECT_EQ(crash_text(with_places(record_of(CRASH_OVERFLOW), symbols)).substr(0, 37), "the stack overflowed at fit_frame+0x0");
 
   crash_record record = record_of(CRASH_WATCHDOG);
   record.stuck = CRASH_STUCK_SCAN | CRASH_STUCK_USB;
@@ -107,8 +106,7 @@ TEST(Crash, InWords) {
 
   record = record_of(CRASH_EXCEPTION);
   record.vector = 16 + 20;
-  EXPECT_EQ(crash_text(with_places(record, std::nullopt)).substr(0, 50),
-            "interrupt 20 came, which has no handler, at 0x2000");
+  EXPECT_EQ(crash_text(with_places(record, std::nullopt)).substr(0, 50), "interrupt 20 came, which has no handler, at 0x2000");
   EXPECT_EQ(crash_text(with_places(record_of(CRASH_START), std::nullopt)),
             "a start that gave up: clocks that did not come, or a fault in the start-up code");
 }
@@ -126,9 +124,8 @@ TEST(Crash, WhatALaterFirmwareTellsIsToldAsNumbers) {
 TEST(Crash, EventsAndRegisters) {
   crash_record record = record_of(CRASH_FAULT);
   EXPECT_EQ(events_text(record), "command stream 1.50 s, started 4 min");
-  EXPECT_EQ(registers_text(record),
-            "r0 0x00000001 r1 0x00000000 r2 0x00000000 r3 0x00000000 r12 0x00000000 lr 0x20001235 "
-            "xpsr 0x01000000 sp 0x20041f00");
+  EXPECT_EQ(registers_text(record), "r0 0x00000001 r1 0x00000000 r2 0x00000000 r3 0x00000000 r12 0x00000000 lr 0x20001235 "
+                                    "xpsr 0x01000000 sp 0x20041f00");
   record.sp = 0;
   record.event_codes[0] = CRASH_EVENT_NONE;
   EXPECT_EQ(events_text(record), "");

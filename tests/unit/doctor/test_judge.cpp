@@ -103,9 +103,7 @@ static void miss(Facts &facts, std::uint32_t sensors) { facts.after->sensors_pre
 
 static void hold(Facts &facts) { facts.holders.seen.push_back({123, "screen"}); }
 
-static void drift(Facts &facts, double Pa_per_s, double sd_Pa_per_s) {
-  facts.rest->sensors[5].drift = Slope{Pa_per_s, sd_Pa_per_s};
-}
+static void drift(Facts &facts, double Pa_per_s, double sd_Pa_per_s) { facts.rest->sensors[5].drift = Slope{Pa_per_s, sd_Pa_per_s}; }
 
 /* The only finding, with these words and of the sensors of these bits, where this is changed of a good one. */
 struct Case {
@@ -204,8 +202,7 @@ const Case CASES[] = {
        drift(f, 300, 0.1);
      }},
     {warn, "zero", "not every sensor has one", 0, [](Facts &f) { f.rest->last_flags = 0; }},
-    {warn, "zero", "may be a zero that has moved", 0,
-     [](Facts &f) { f.rest->last_flags |= CONTACT_FLAG_ZERO_DOUBTFUL; }},
+    {warn, "zero", "may be a zero that has moved", 0, [](Facts &f) { f.rest->last_flags |= CONTACT_FLAG_ZERO_DOUBTFUL; }},
     {warn, "rate", "expected", 0, [](Facts &f) { set_rate(f, 0.9); }},
     {bad, "rate", "expected", 0, [](Facts &f) { set_rate(f, 0.5); }},
     {warn, "bus", "2.0 NACKs/s", 0, [](Facts &f) { f.after->bus_nacks = 20; }},
@@ -354,8 +351,7 @@ TEST(Judge, ACrashIsToldWithItsPlaceEventsAndRegisters) {
   EXPECT_EQ(findings[0].check, "restarts");
   EXPECT_EQ(findings[1].check, "crash");
   EXPECT_EQ(findings[1].verdict, Verdict::bad);
-  for (const char *part :
-       {"a hard fault at 0x20001000", "before that: command stream", "sp 0x20041f00", "other firmware"}) {
+  for (const char *part : {"a hard fault at 0x20001000", "before that: command stream", "sp 0x20041f00", "other firmware"}) {
     EXPECT_TRUE(contains(findings[1].text, part)) << findings[1].text;
   }
   facts.crash->record.kind = CRASH_START;

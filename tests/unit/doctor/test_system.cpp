@@ -10,8 +10,7 @@
 
 namespace fs = std::filesystem;
 
-const char *const TTY_RULE =
-    "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"1209\", ATTRS{idProduct}==\"0001\", MODE=\"0660\"\n";
+const char *const TTY_RULE = "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"1209\", ATTRS{idProduct}==\"0001\", MODE=\"0660\"\n";
 
 class System : public ::testing::Test {
 protected:
@@ -58,8 +57,8 @@ private:
 
 TEST_F(System, RuleIsFoundWhereUdevLooks) {
   EXPECT_EQ(rule(), "");
-  for (const char *path : {"etc/udev/rules.d/60-fingertip.rules", "usr/lib/udev/rules.d/60-fingertip.rules",
-                           "usr/local/lib/udev/rules.d/99-mine.rules"}) {
+  for (const char *path :
+       {"etc/udev/rules.d/60-fingertip.rules", "usr/lib/udev/rules.d/60-fingertip.rules", "usr/local/lib/udev/rules.d/99-mine.rules"}) {
     write(path, TTY_RULE);
     EXPECT_EQ(rule(), folder_ / path);
     fs::remove(folder_ / path);
@@ -71,8 +70,7 @@ TEST_F(System, WhatDoesNotActIsNoRule) {
   EXPECT_EQ(rule(), "") << "a comment";
   write("etc/udev/rules.d/60-fingertip.rules.old", TTY_RULE);
   EXPECT_EQ(rule(), "") << "udev reads *.rules only";
-  write("etc/udev/rules.d/60-fingertip.rules",
-        "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"1209\", ATTRS{idProduct}==\"0002\"\n");
+  write("etc/udev/rules.d/60-fingertip.rules", "SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"1209\", ATTRS{idProduct}==\"0002\"\n");
   EXPECT_EQ(rule(), "") << "another device";
 }
 

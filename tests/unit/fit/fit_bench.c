@@ -34,17 +34,12 @@ void read_press(const struct press *press, double noise_Pa, struct random *rando
   }
 }
 
-double location_error_mm(const struct press *press) {
-  return hypot((double)result.x_mm - press->x_mm, (double)result.y_mm - press->y_mm);
-}
+double location_error_mm(const struct press *press) { return hypot((double)result.x_mm - press->x_mm, (double)result.y_mm - press->y_mm); }
 
-double force_of(const struct press *press) {
-  return 6.283185307179586 * press->p0_Pa * press->sigma_mm * press->sigma_mm * 1e-6;
-}
+double force_of(const struct press *press) { return 6.283185307179586 * press->p0_Pa * press->sigma_mm * press->sigma_mm * 1e-6; }
 
 struct press random_press(struct random *random, double reach_mm) {
-  return (struct press){random_between(random, -9.0 - reach_mm, 9.0 + reach_mm),
-                        random_between(random, -18.0 - reach_mm, 18.0 + reach_mm),
+  return (struct press){random_between(random, -9.0 - reach_mm, 9.0 + reach_mm), random_between(random, -18.0 - reach_mm, 18.0 + reach_mm),
                         exp(random_between(random, log(500.0), log(100000.0))), random_between(random, 4.0, 12.0)};
 }
 
@@ -58,9 +53,9 @@ void assert_finite_and_defined(void) {
     TEST_ASSERT_TRUE(isfinite(values[i]));
     TEST_ASSERT_TRUE(valid || values[i] == 0.0f);
   }
-  const uint32_t known = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_LOW_SIGNAL |
-                         CONTACT_FLAG_FLAT | CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND |
-                         CONTACT_FLAG_SENSOR_MASKED | CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
+  const uint32_t known = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_FLAT |
+                         CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SENSOR_MASKED |
+                         CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
   TEST_ASSERT_EQUAL_HEX32(0, result.flags & ~known);
   TEST_ASSERT_EQUAL((result.flags & CONTACT_FLAG_WIDTHS_VALID) != 0, result.sigma_x_mm > 0.0f);
   TEST_ASSERT_EQUAL(result.sigma_x_mm > 0.0f, result.sigma_y_mm > 0.0f);

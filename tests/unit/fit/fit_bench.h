@@ -1,5 +1,4 @@
-/* Presses on the array of fifteen, and what a fit said of one, for the tests of fit/fit.h. setUp
- * clears the readings. */
+/* Presses on the array of fifteen, and what a fit said of one, for the tests of fit/fit.h. setUp clears the readings. */
 #pragma once
 
 #include "common/contact_flags.h"

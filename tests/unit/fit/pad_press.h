@@ -1,5 +1,4 @@
-/* What the sensors of the boards' array read under a contact on a pad, for the tests of what estimates by its profile.
- */
+/* What the sensors of the boards' array read under a contact on a pad, for the tests of what estimates by its profile. */
 #pragma once
 
 #include "support/grid.h"
@@ -34,8 +33,7 @@ static inline double pad_press_Pa(const struct pad_press *pad, const struct cont
   }
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
     const double v = pow((double)pad->profile.tangential[j].sd_mm, 2) + 1.3 * contact->spread_mm2;
-    sum += (contact->qx_N * dx + contact->qy_N * dy) * (double)pad->profile.tangential[j].moment_mm / (v * v) *
-           exp(-r2 / (2 * v));
+    sum += (contact->qx_N * dx + contact->qy_N * dy) * (double)pad->profile.tangential[j].moment_mm / (v * v) * exp(-r2 / (2 * v));
   }
   if (pad->dip_share > 0.0) {
     const double v = square_mm2 + contact->spread_mm2 - usual_mm2;
@@ -45,11 +43,9 @@ static inline double pad_press_Pa(const struct pad_press *pad, const struct cont
 }
 
 /* Every sensor off its place and wider by at most these. */
-static inline void pad_press_draw_own(struct pad_press *pad, int32_t off_q15, int32_t wider_q15,
-                                      struct random *random) {
+static inline void pad_press_draw_own(struct pad_press *pad, int32_t off_q15, int32_t wider_q15, struct random *random) {
   for (int k = 0; k < GRID_SENSORS; k++) {
-    pad->own[k] = (struct fit_own){(int32_t)random_between(random, -off_q15, off_q15),
-                                   (int32_t)random_between(random, -off_q15, off_q15),
+    pad->own[k] = (struct fit_own){(int32_t)random_between(random, -off_q15, off_q15), (int32_t)random_between(random, -off_q15, off_q15),
                                    (int32_t)random_between(random, -wider_q15, wider_q15)};
   }
 }

@@ -201,8 +201,7 @@ TEST(test_order_and_rotation_of_the_sensors) {
   }
 }
 
-/* Every way to lose one, two or three sensors: recovered, or called uncertain. What the lost
- * sensors read must not matter. */
+/* Every way to lose one, two or three sensors: recovered, or called uncertain. What the lost sensors read must not matter. */
 TEST(test_every_mask_of_up_to_three_sensors) {
   struct random random = {75};
   int uncertain = 0, masks = 0;
@@ -270,8 +269,7 @@ TEST(test_duplicate_positions) {
   TEST_ASSERT_BITS_LOW(CONTACT_FLAG_UNCERTAIN, result.flags);
 }
 
-/* Six sensors, 6 mm apart, on a line at any angle: the location is found along it, and its scatter
- * is the predicted one. */
+/* Six sensors, 6 mm apart, on a line at any angle: the location is found along it, and its scatter is the predicted one. */
 TEST(test_sensors_on_a_line) {
   enum { COUNT = 6, FITS = 2000 };
   struct random random = {94};
@@ -290,8 +288,7 @@ TEST(test_sensors_on_a_line) {
     for (int i = 0; i < FITS; i++) {
       const double noise_Pa = i == 0 ? 0.0 : 5.0;
       const double at = random_between(&random, 6.0, 24.0);
-      const struct press press = {origin_x + at * along_x, origin_y + at * along_y, 5000.0,
-                                  random_between(&random, 3.0, 6.0)};
+      const struct press press = {origin_x + at * along_x, origin_y + at * along_y, 5000.0, random_between(&random, 3.0, 6.0)};
       for (int k = 0; k < COUNT; k++) {
         readings[k] = to_q10(gaussian(&press, (double)x[k], (double)y[k]) + noise_Pa * random_normal(&random));
       }

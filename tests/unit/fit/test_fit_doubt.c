@@ -66,8 +66,8 @@ TEST(test_a_force_is_part_of_the_error) {
     stated_mm += (double)result.location_sd_mm;
     silent += error_mm > 1.0 && !is_uncertain();
   }
-  CHECK(fabs(stated_mm / errors_mm - 1.0) < 0.2 && silent <= 4, "off %.2f mm, stated %.2f mm, %d silent",
-        errors_mm / 400.0, stated_mm / 400.0, silent);
+  CHECK(fabs(stated_mm / errors_mm - 1.0) < 0.2 && silent <= 4, "off %.2f mm, stated %.2f mm, %d silent", errors_mm / 400.0,
+        stated_mm / 400.0, silent);
 }
 
 TEST(test_without_a_force_little_is_added) {
@@ -93,8 +93,7 @@ TEST(test_before_the_first_search_a_force_is_assumed) {
     for (int part = 0; part < FIT_DOUBT_PARTS; part++) {
       result = fitted;
       widen();
-      TEST_ASSERT_FLOAT_WITHIN(0.01f, hypotf(fitted.location_sd_mm, FIT_DOUBT_USUAL * 0.38f * 9.0f),
-                               result.location_sd_mm);
+      TEST_ASSERT_FLOAT_WITHIN(0.01f, hypotf(fitted.location_sd_mm, FIT_DOUBT_USUAL * 0.38f * 9.0f), result.location_sd_mm);
       TEST_ASSERT_TRUE(is_uncertain());
       follow();
     }
@@ -142,8 +141,7 @@ TEST(test_a_dip_that_is_known_is_no_force) {
       hold(ALL);
       warned[i % 2] += is_uncertain();
     }
-    CHECK(warned[0] <= 4 && warned[1] >= 180, "known %.1f mm, of 200 warned: %d, pulled %d", (double)known_mm[c],
-          warned[0], warned[1]);
+    CHECK(warned[0] <= 4 && warned[1] >= 180, "known %.1f mm, of 200 warned: %d, pulled %d", (double)known_mm[c], warned[0], warned[1]);
   }
 }
 
@@ -185,8 +183,7 @@ TEST(test_sensors_may_be_missing) {
 }
 
 TEST(test_what_is_no_fit_stays_as_it_is) {
-  const uint32_t flags[] = {0, CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_AT_BOUND,
-                            CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_FLAT};
+  const uint32_t flags[] = {0, CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_AT_BOUND, CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_FLAT};
   press(2.0, 3.0, 0.4, 0.1);
   for (int i = 0; i < 3; i++) {
     fit();

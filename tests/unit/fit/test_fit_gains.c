@@ -86,8 +86,7 @@ TEST(test_touches_show_how_far_gains_are_apart) {
     }
     /* of 64 touches four stay what was assumed */
     const double expected = sqrt((60.0 * spreads[s] * spreads[s] + 4.0 * 0.105 * 0.105) / 64.0);
-    CHECK(fabs(expected - sqrt(squares)) < 0.12 * expected + 0.002, "gains apart by %.2f: learnt %.4f", spreads[s],
-          sqrt(squares));
+    CHECK(fabs(expected - sqrt(squares)) < 0.12 * expected + 0.002, "gains apart by %.2f: learnt %.4f", spreads[s], sqrt(squares));
   }
 }
 

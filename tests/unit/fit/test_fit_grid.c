@@ -77,9 +77,7 @@ static struct fit_result by_gaussian(const struct fit_settings *settings) {
   return result;
 }
 
-static float apart_mm(const struct fit_result *a, const struct fit_result *b) {
-  return hypotf(a->x_mm - b->x_mm, a->y_mm - b->y_mm);
-}
+static float apart_mm(const struct fit_result *a, const struct fit_result *b) { return hypotf(a->x_mm - b->x_mm, a->y_mm - b->y_mm); }
 
 static void assert_columns(uint8_t sensors, float pitch_mm, uint8_t columns) {
   TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, sensors, x_mm, y_mm, pitch_mm));
@@ -168,8 +166,8 @@ TEST(an_outlier_is_left_out) {
       TEST_ASSERT_EQUAL(masked, result.used != ALL);
       found += result.used == WITHOUT(wrong) && moved_mm < 0.2f;
       others += masked && result.used != WITHOUT(wrong);
-      const uint32_t warnings = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND |
-                                CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL;
+      const uint32_t warnings =
+          CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL;
       unwarned += moved_mm > 1.0f && !(result.flags & warnings);
     }
     TEST_ASSERT_GREATER_THAN_INT(PRESSES * 3 / 5, found);
@@ -253,8 +251,7 @@ TEST(a_prior_leaves_what_is_uncertain_so) {
   for (int i = 0; i < 3000; i++) {
     press(0, 0, 0.0, 1.0, 5.0);
     readings[random_below(&random, SENSORS)] += (int32_t)any(150e3, 4000e3);
-    const struct fit_result grid =
-        i % 2 ? by_grid(&settings) : by_masked(WITHOUT(random_below(&random, SENSORS)), &settings);
+    const struct fit_result grid = i % 2 ? by_grid(&settings) : by_masked(WITHOUT(random_below(&random, SENSORS)), &settings);
     if (grid.flags & CONTACT_FLAG_FIT_VALID) {
       const struct fit_result general = by_general(grid.used, &settings);
       if (!((grid.flags | general.flags) & CONTACT_FLAG_AT_BOUND)) {
@@ -330,8 +327,7 @@ static float off_mm(const struct fit_result *result, double x, double y) {
 
 /* How far grid and general kernel are off, and how far the kernels are apart. */
 static void judge(const struct fit_settings *settings, double x, double y, float *worst, float *apart) {
-  const struct fit_result grid = by_grid(settings), masked = by_masked(ALL, settings),
-                          general = by_general(ALL, settings);
+  const struct fit_result grid = by_grid(settings), masked = by_masked(ALL, settings), general = by_general(ALL, settings);
   *worst = fmaxf(*worst, fmaxf(off_mm(&grid, x, y), off_mm(&general, x, y)));
   *apart = fmaxf(*apart, fmaxf(apart_mm(&general, &grid), apart_mm(&masked, &grid)));
 }
@@ -349,8 +345,8 @@ TEST(a_known_dip_is_added_back_alike_in_all) {
     unknown = fmaxf(unknown, off_mm(&plain, x, y));
     TEST_ASSERT_TRUE(by_grid(&settings).location_sd_mm <= plain.location_sd_mm);
   }
-  CHECK(unknown > 0.3f && worst < 0.08f && apart < 0.02f, "off %.3f mm, unknown %.3f, kernels apart %.3f",
-        (double)worst, (double)unknown, (double)apart);
+  CHECK(unknown > 0.3f && worst < 0.08f && apart < 0.02f, "off %.3f mm, unknown %.3f, kernels apart %.3f", (double)worst, (double)unknown,
+        (double)apart);
 }
 
 /* Narrow contacts up to a third of a pitch beyond the outer sensors. The kernel for wide contacts,
@@ -363,16 +359,14 @@ TEST(beyond_the_sensors_the_dip_shows_the_place) {
     const double sigma = any(2.8, 3.6), sd = 3.2 * sigma;
     press_cast(x, y, sigma, 0.035, sd, no_own);
     const struct fit_settings settings = of_cast(sigma, 0.035, sd);
-    const struct fit_result found = by_gaussian(&settings), wide = by_grid(&settings),
-                            general = by_general(ALL, &settings);
+    const struct fit_result found = by_gaussian(&settings), wide = by_grid(&settings), general = by_general(ALL, &settings);
     far += off_mm(&found, x, y) > 0.5f;
     far_of_wide += off_mm(&wide, x, y) > 0.5f;
     unsure += off_mm(&found, x, y) > 2.5f * found.location_sd_mm;
     apart += apart_mm(&general, &found) > 0.05f;
   }
   CHECK(far_of_wide > PRESSES / 2 && far <= PRESSES / 50 && unsure <= PRESSES / 100 && apart <= PRESSES / 25,
-        "of %d off by 0.5 mm: %d, wide kernel %d; beyond 2.5 sd %d; apart %d", PRESSES, far, far_of_wide, unsure,
-        apart);
+        "of %d off by 0.5 mm: %d, wide kernel %d; beyond 2.5 sd %d; apart %d", PRESSES, far, far_of_wide, unsure, apart);
 }
 
 /* Sensors that are off their places and measure a contact wider, on a pad without a dip and with one. */
@@ -402,9 +396,8 @@ TEST(what_is_the_sensors_own_is_taken_out_alike_in_all) {
     const struct fit_result without[] = {by_grid(&settings), by_masked(ALL, &settings), by_general(ALL, &settings)};
     TEST_ASSERT_EQUAL_MEMORY(early, without, sizeof early);
   }
-  CHECK(unknown > 0.1f && worst < 0.08f && apart < 0.03f && rough < 40,
-        "off %.3f mm, unknown %.3f, kernels apart %.3f; %d rough", (double)worst, (double)unknown, (double)apart,
-        rough);
+  CHECK(unknown > 0.1f && worst < 0.08f && apart < 0.03f && rough < 40, "off %.3f mm, unknown %.3f, kernels apart %.3f; %d rough",
+        (double)worst, (double)unknown, (double)apart, rough);
 }
 
 /* A sensor that measures a contact much wider is no outlier to a fit that knows it. */

@@ -4,8 +4,7 @@
 #include "support/unit.h"
 
 TEST(test_mul_q30) {
-  static const int32_t corners[] = {0,      1,       -1,         65535,      65536,       -65535,
-                                    -65536, 1 << 30, -(1 << 30), 1073741823, -1073741823, 1073676289};
+  static const int32_t corners[] = {0, 1, -1, 65535, 65536, -65535, -65536, 1 << 30, -(1 << 30), 1073741823, -1073741823, 1073676289};
   double worst = 0.0;
   struct random random = {61};
   for (int i = 0; i < 2000000; i++) {

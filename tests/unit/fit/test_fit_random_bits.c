@@ -1,7 +1,6 @@
-/* Inputs of any bits: every result is finite, consistent, and within its documented range, and the build's sanitizers
- * find nothing. Every input goes through fit_gaussian; some, as
- * frames that follow each other, through all that is computed of a frame. The number in a failure's message repeats the
- * input. RANDOM_BITS, if set, is the number of inputs and the seed. */
+/* Inputs of any bits: every result is finite, consistent, and within its documented range, and the build's sanitizers find nothing. Every
+ * input goes through fit_gaussian; some, as frames that follow each other, through all that is computed of a frame. The number in a
+ * failure's message repeats the input. RANDOM_BITS, if set, is the number of inputs and the seed. */
 #include "common/calibration.h"
 #include "common/contact_flags.h"
 #include "condition/plausibility.h"
@@ -51,8 +50,7 @@ static void make_grid(struct fit_array *array, uint8_t columns, uint8_t rows, fl
   make_array(array, (uint8_t)(columns * rows), x, y, pitch_mm);
 }
 
-static void make_scattered(struct random *random, struct fit_array *array, uint8_t count, float spread_mm,
-                           float pitch_mm) {
+static void make_scattered(struct random *random, struct fit_array *array, uint8_t count, float spread_mm, float pitch_mm) {
   float x[FT_MAX_SENSORS], y[FT_MAX_SENSORS];
   for (uint8_t k = 0; k < count; k++) {
     x[k] = (float)random_between(random, (double)-spread_mm, (double)spread_mm);
@@ -90,8 +88,7 @@ static int32_t to_int32(double value) {
 }
 
 static int32_t extreme(struct random *random) {
-  static const int32_t values[] = {INT32_MIN,     INT32_MIN + 1, -1,      0,       1,      2,
-                                   INT32_MAX - 1, INT32_MAX,     1 << 27, 1 << 28, 1 << 30};
+  static const int32_t values[] = {INT32_MIN, INT32_MIN + 1, -1, 0, 1, 2, INT32_MAX - 1, INT32_MAX, 1 << 27, 1 << 28, 1 << 30};
   return values[random_below(random, sizeof values / sizeof *values)];
 }
 
@@ -123,27 +120,13 @@ static void draw_readings(struct random *random, struct input *input) {
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
     int32_t *p = &input->pressure_Pa_q10[k];
     switch (kind) {
-    case 0:
-      *p = any_bits(random);
-      break;
-    case 1: /* small ones */
-      *p = any_bits(random) >> shift;
-      break;
-    case 2:
-      *p = k == hot ? constant : 0;
-      break;
-    case 3:
-      *p = constant;
-      break;
-    case 4:
-      *p = extreme(random);
-      break;
-    case 5: /* sparse */
-      *p = random_below(random, 4) ? 0 : any_bits(random);
-      break;
-    default: /* Cauchy */
-      *p = to_int32(ldexp(tan(random_between(random, -1.5707963, 1.5707963)), (int)shift));
-      break;
+    case 0: *p = any_bits(random); break;
+    case 1: /* small ones */ *p = any_bits(random) >> shift; break;
+    case 2: *p = k == hot ? constant : 0; break;
+    case 3: *p = constant; break;
+    case 4: *p = extreme(random); break;
+    case 5: /* sparse */ *p = random_below(random, 4) ? 0 : any_bits(random); break;
+    default: /* Cauchy */ *p = to_int32(ldexp(tan(random_between(random, -1.5707963, 1.5707963)), (int)shift)); break;
     }
   }
 }
@@ -151,8 +134,7 @@ static void draw_readings(struct random *random, struct input *input) {
 static float any_float(struct random *random) {
   float value;
   uint32_t bits = random_u32(random);
-  static const uint32_t special[] = {0,          0x80000000, 1,          0x7FFFFF,   0x800000,
-                                     0x7F7FFFFF, 0x7F800000, 0xFF800000, 0x7FC00000, 0x7F800001};
+  static const uint32_t special[] = {0, 0x80000000, 1, 0x7FFFFF, 0x800000, 0x7F7FFFFF, 0x7F800000, 0xFF800000, 0x7FC00000, 0x7F800001};
   if (random_below(random, 4) == 0) {
     bits = special[random_below(random, sizeof special / sizeof *special)];
   }
@@ -207,8 +189,7 @@ static struct input draw(uint32_t number, const struct fit_array *on) {
     settings->prior_sigma_mm = (float)exp(random_between(&random, -5, 7));
     settings->prior_width_mm = (float)exp(random_between(&random, -5, 7));
     break;
-  default:
-    break;
+  default: break;
   }
   return input;
 }
@@ -279,8 +260,7 @@ static const char *complaint(const struct input *input, const struct fit_result 
 
 static void judge(uint32_t number, const char *kernel, const struct input *input, const struct fit_result *result) {
   const char *wrong = complaint(input, result);
-  CHECK(wrong == NULL, "input %u, %s: %s; flags %x", (unsigned)number, kernel, wrong ? wrong : "",
-        (unsigned)result->flags);
+  CHECK(wrong == NULL, "input %u, %s: %s; flags %x", (unsigned)number, kernel, wrong ? wrong : "", (unsigned)result->flags);
 }
 
 TEST(test_any_bits_give_finite_consistent_results) {
@@ -416,10 +396,8 @@ static void fit_any(uint32_t number, const struct input *input, bool begins) {
   settings->cut_noises = 0;
   settings->location_sd_limit_mm = 0.0f;
   void (*const plain[])(const struct fit_array *, const int32_t *, uint32_t, const struct fit_settings *,
-                        struct fit_result *) = {fit_gaussian_grid, fit_gaussian_grid_plain, fit_gaussian_grid_small,
-                                                fit_general};
-  for (size_t k = 0; k < sizeof plain / sizeof *plain - (settings->noise_Pa_q10 < 1);
-       k++) { /* the last one needs noise */
+                        struct fit_result *) = {fit_gaussian_grid, fit_gaussian_grid_plain, fit_gaussian_grid_small, fit_general};
+  for (size_t k = 0; k < sizeof plain / sizeof *plain - (settings->noise_Pa_q10 < 1); k++) { /* the last one needs noise */
     plain[k](input->array, readings, input->usable, settings, &fit);
     judge(number, "a kernel of the grid", input, &fit);
   }
@@ -432,8 +410,7 @@ static void fit_any(uint32_t number, const struct input *input, bool begins) {
   tangential_estimate(&tip.tangential);
   struct shapes_question *question = &tip.shapes.question;
   if (begins || tip.shapes.progress != FIT_SHAPES_UNFINISHED) {
-    *question = (struct shapes_question){
-        .begins = begins, .t_us = tip.frame.t_us, .settings = *settings, .fit = fit, .force_scale = 1.0f};
+    *question = (struct shapes_question){.begins = begins, .t_us = tip.frame.t_us, .settings = *settings, .fit = fit, .force_scale = 1.0f};
     memcpy(question->pressure_Pa_q10, readings, sizeof question->pressure_Pa_q10);
   }
   question->parts = below(8) ? 1 : FIT_SHAPES_FRAMES * FIT_SHAPES_PARTS;
@@ -453,8 +430,8 @@ static void fit_any(uint32_t number, const struct input *input, bool begins) {
   fit_doubt_follow(&tip.doubt, input->array, readings, settings, &fit);
   fit_gains_learn(&tip.gains, input->array, readings, settings, &fit);
   const struct fit_tangential *found = &tip.tangential.estimate;
-  bool good = are_finite(&found->x_mm, 9 * sizeof(float)) && FINITE(force) && FINITE(weighed) && FINITE(motion) &&
-              FINITE(place) && FINITE(tip.shapes.report.contact) && FINITE(tip.shapes.report.edge_length_mm);
+  bool good = are_finite(&found->x_mm, 9 * sizeof(float)) && FINITE(force) && FINITE(weighed) && FINITE(motion) && FINITE(place) &&
+              FINITE(tip.shapes.report.contact) && FINITE(tip.shapes.report.edge_length_mm);
   static const struct fit_tangential none;
   good = good && (found->valid ? (fit.flags & CONTACT_FLAG_FIT_VALID) && found->force_N > 0.0f && found->q_sd_N > 0.0f
                                : memcmp(found, &none, sizeof none) == 0);

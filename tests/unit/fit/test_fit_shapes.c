@@ -306,9 +306,7 @@ TEST(test_rubber_beyond_the_limits_is_refused) {
 }
 
 /* chi^2 + 14 must fall by a quarter. */
-static int32_t limit_q8(int32_t unexplained_q8) {
-  return 4 * (unexplained_q8 + (FIT_SHAPES_ERRORS << 8)) / 3 - (FIT_SHAPES_ERRORS << 8);
-}
+static int32_t limit_q8(int32_t unexplained_q8) { return 4 * (unexplained_q8 + (FIT_SHAPES_ERRORS << 8)) / 3 - (FIT_SHAPES_ERRORS << 8); }
 
 /* Of these chi^2, and a pair and a line with these spans. */
 static int32_t pair[FIT_SHAPES_UNKNOWNS], straight[FIT_SHAPES_UNKNOWNS];

@@ -98,8 +98,7 @@ static double off_mm(const struct fit_tangential *a, const struct fit_tangential
 }
 
 static double off_ratio(const struct fit_tangential *a, const struct fit_tangential *b) {
-  return hypot((double)(a->qx_N / a->force_N - b->qx_N / b->force_N),
-               (double)(a->qy_N / a->force_N - b->qy_N / b->force_N));
+  return hypot((double)(a->qx_N / a->force_N - b->qx_N / b->force_N), (double)(a->qy_N / a->force_N - b->qy_N / b->force_N));
 }
 
 /* Of 300 contacts: the least number of valid ones, and of those the most that may be further off
@@ -122,8 +121,8 @@ static void judge_pad(double thickness_mm, uint32_t usable, double mm, double sh
     double sd_mm = (double)found.location_sd_mm, sd_N = (double)found.q_sd_N;
     /* What is determined loosely is drawn towards the priors. */
     outside += far_mm > mm + sd_mm || off > share * contact.force_N + sd_N;
-    CHECK(outside <= most_off, "%g mm, press %d at %.1f %.1f: off by %.4f mm (sd %.4f), %.4f of %.3f N (sd %.4f)",
-          thickness_mm, i, contact.x_mm, contact.y_mm, far_mm, sd_mm, off, contact.force_N, sd_N);
+    CHECK(outside <= most_off, "%g mm, press %d at %.1f %.1f: off by %.4f mm (sd %.4f), %.4f of %.3f N (sd %.4f)", thickness_mm, i,
+          contact.x_mm, contact.y_mm, far_mm, sd_mm, off, contact.force_N, sd_N);
   }
   TEST_ASSERT_GREATER_OR_EQUAL_INT(least, valid);
 }

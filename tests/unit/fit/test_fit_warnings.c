@@ -140,12 +140,8 @@ TEST(test_widths_and_slant) {
 /* The profile's tail is not what the dip says: 1 % of the peak too much of it. */
 TEST(test_a_wrong_tail_is_no_elongation) {
   struct random random = {103};
-  struct fit_settings settings = {.iterations = 4,
-                                  .noise_Pa_q10 = 5 * 1024,
-                                  .prior_sigma_mm = 5.5f,
-                                  .prior_width_mm = 0.06f,
-                                  .dip_share = 0.01f,
-                                  .dip_sd_mm = 20.7f};
+  struct fit_settings settings = {
+      .iterations = 4, .noise_Pa_q10 = 5 * 1024, .prior_sigma_mm = 5.5f, .prior_width_mm = 0.06f, .dip_share = 0.01f, .dip_sd_mm = 20.7f};
   fit_set_errors(&settings, 0.01f, 0.005f);
   int elongated[2] = {0};
   for (int i = 0; i < 1000; i++) {
@@ -189,8 +185,7 @@ TEST(test_two_contacts_are_not_the_model) {
   struct press one = {0.0, -14.0, 5000.0, 5.0};
   struct press other = {0.0, 14.0, 5000.0, 5.0};
   for (int k = 0; k < SENSORS; k++) {
-    readings[k] =
-        to_q10(gaussian(&one, (double)x_mm[k], (double)y_mm[k]) + gaussian(&other, (double)x_mm[k], (double)y_mm[k]));
+    readings[k] = to_q10(gaussian(&one, (double)x_mm[k], (double)y_mm[k]) + gaussian(&other, (double)x_mm[k], (double)y_mm[k]));
   }
   fit_gaussian(&array, readings, ALL, &usual, &result);
   assert_finite_and_defined();

@@ -81,8 +81,8 @@ public:
   GripReport report;
   double t_s = 1.0, width_mm = 60.0, force_N = 0.0, load_N = 0.0, slide_mm_s = 0.0;
   double object_mm = 40.0, stiffness = 3.0, power = 1.6; // of a pad at 1 mm; 0 mm: nothing there
-  double off_mm = 0.0;  // the object presses fingertip 0 by so much more, fingertip 1 less
-  double delay_s = 0.0; // of frames
+  double off_mm = 0.0;                                   // the object presses fingertip 0 by so much more, fingertip 1 less
+  double delay_s = 0.0;                                  // of frames
   double frame_s = 1.0 / 410.0;
   std::array<double, 2> gain{1.0, 1.0}, load_share{1.0, 1.0};
   double sd_share = 0.05; // of a force, as reported
@@ -116,9 +116,8 @@ private:
     if (sensed_N < 0.02) {
       return touch;
     }
-    touch.flags = (CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                   CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID |
-                   (slides[finger] ? std::uint32_t{CONTACT_FLAG_SLIDING} : 0u) | add_flags[finger]) &
+    touch.flags = (CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TANGENTIAL_VALID |
+                   CONTACT_FLAG_VELOCITY_VALID | (slides[finger] ? std::uint32_t{CONTACT_FLAG_SLIDING} : 0u) | add_flags[finger]) &
                   ~drop_flags[finger];
     touch.force_N = sensed_N;
     touch.force_sd_N = sd_share * sensed_N;
@@ -187,8 +186,6 @@ private:
   bool moves_ = false;
 };
 
-inline void expect_share(double expected, double found, double share) {
-  EXPECT_NEAR(found, expected, share * expected);
-}
+inline void expect_share(double expected, double found, double share) { EXPECT_NEAR(found, expected, share * expected); }
 
 } // namespace fingertip::test

@@ -28,8 +28,7 @@ TEST(Convert, WhatNoFlagStandsForIsZero) {
   packet.body.contact.force_N = 4;
   packet.body.contact.flags = CONTACT_FLAG_CONTACT;
   const GripTouch touch = touch_from_packet(packet, -1);
-  for (const double value :
-       {touch.force_N, touch.force_sd_N, touch.x_mm, touch.sigma_mm, touch.qx_N, touch.speed_x_mm_s, touch.t_s}) {
+  for (const double value : {touch.force_N, touch.force_sd_N, touch.x_mm, touch.sigma_mm, touch.qx_N, touch.speed_x_mm_s, touch.t_s}) {
     EXPECT_EQ(value, 0.0);
   }
 }

@@ -331,8 +331,7 @@ TEST(Grip, AnExpectedMassDecidesTheFirstGrip) {
     world.drop_flags = {is_seen ? 0u : std::uint32_t{CONTACT_FLAG_TANGENTIAL_VALID}};
     world.drop_flags[1] = world.drop_flags[0];
     world.grasp();
-    expect_share(world.settings.margin * MASS_kg * (9.81 + LIFT_m_s2) / (2.0 * world.settings.friction), world.force_N,
-                 0.08);
+    expect_share(world.settings.margin * MASS_kg * (9.81 + LIFT_m_s2) / (2.0 * world.settings.friction), world.force_N, 0.08);
   }
   GripWorld world({{"mass", 0.02}});
   world.grasp();

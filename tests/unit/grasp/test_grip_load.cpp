@@ -154,8 +154,7 @@ TEST(Grip, WhatSlidesInALiftDoesNotFeedItself) {
   EXPECT_LT(world.force_N, 1.5 * before_N);
 }
 
-// A slide is still reported when the object has been caught already. What it asked for and is not
-// under way is given up then.
+// A slide is still reported when the object has been caught already. What it asked for and is not under way is given up then.
 TEST(Grip, ASlideThatSlowsDownIsNotPursued) {
   GripperTraits slow = fine_gripper();
   slow.latency_s = 0.05;

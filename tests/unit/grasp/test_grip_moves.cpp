@@ -37,8 +37,7 @@ TEST(Grip, TheTrueForceStaysBelowTheCap) {
 TEST(Grip, OneThatIsFrozenInTheAirNeverLeadsBeyondTheCap) {
   for (const char *model : {"2f85", "sts3215"}) {
     for (const bool fixed : {false, true}) {
-      GripWorld world(fixed ? std::map<std::string, double>{{"cap", 4}, {"fixed", 3.5}}
-                            : std::map<std::string, double>{{"cap", 4}},
+      GripWorld world(fixed ? std::map<std::string, double>{{"cap", 4}, {"fixed", 3.5}} : std::map<std::string, double>{{"cap", 4}},
                       gripper_traits(model));
       world.gain[0] = 0.0;
       ASSERT_TRUE(world.grip.request(GRIP_REQUEST_GRASP));
@@ -144,8 +143,8 @@ TEST(Grip, NoMoveExceedsALowCapWhereverTheFirstTouchIs) {
           world.run(5.0);
           world.pull(world.report.state == GRIP_HOLDING ? 0.6 : 0.0, 0.3);
           world.run(0.5);
-          const auto about = std::to_string(stiffness) + " " + std::to_string(power) + " " + std::to_string(touch_mm) +
-                             " " + std::to_string(off_mm);
+          const auto about =
+              std::to_string(stiffness) + " " + std::to_string(power) + " " + std::to_string(touch_mm) + " " + std::to_string(off_mm);
           EXPECT_LE(world.peak_N, 2.4) << about;
           if (off_mm == 0.0) { // one that does not give may leave no room for the other pad
             EXPECT_EQ(world.report.state, GRIP_HOLDING) << about;

@@ -67,10 +67,8 @@ protected:
 
 TEST(GripRow, ReadsWhatItWrote) {
   const std::string cells = grip_cells(row_with_everything());
-  EXPECT_EQ(
-      cells,
-      "slipping,finger_1_stale at_cap,34.217,0,1,1,9,0.125,-17,2,34.201,150.000,20.000,4.101,4.019,1.022,1.573,0.400,"
-      "0.012,3");
+  EXPECT_EQ(cells, "slipping,finger_1_stale at_cap,34.217,0,1,1,9,0.125,-17,2,34.201,150.000,20.000,4.101,4.019,1.022,1.573,0.400,"
+                   "0.012,3");
   const GripRow read = grip_row("1530022.5," + cells);
   EXPECT_EQ(read.time_us, 1530022.5);
   EXPECT_EQ(grip_cells(read), cells);
@@ -101,8 +99,8 @@ TEST(GripRow, EveryWrongCellIsNamed) {
 
 TEST_F(GripRowFile, RowsAreFoundBetweenOthersAndFromAnyPlace) {
   const std::string row = grip_cells(row_with_everything());
-  write({"# fingertip-recording 2\n", "# grip: time_us," + grip_columns() + "\n", "0,1,2\n",
-         "# grip: 100.0," + row + "\n", "# grip_event: 1.0,hold\n", "# grip: 200.0," + row + "\r\n"});
+  write({"# fingertip-recording 2\n", "# grip: time_us," + grip_columns() + "\n", "0,1,2\n", "# grip: 100.0," + row + "\n",
+         "# grip_event: 1.0,hold\n", "# grip: 200.0," + row + "\r\n"});
   GripRowReader reader(path_, false);
   EXPECT_EQ(reader.next()->time_us, 100);
   const auto place = reader.place();
@@ -114,8 +112,7 @@ TEST_F(GripRowFile, RowsAreFoundBetweenOthersAndFromAnyPlace) {
 
 TEST_F(GripRowFile, DamageIsSaidWithItsLineOrSkipped) {
   const std::string row = grip_cells(row_with_everything());
-  write({"# grip: time_us," + grip_columns() + "\n", "# grip: 100.0,nonsense\n", "# grip: 200.0," + row + "\n",
-         "# grip: 300.0," + row});
+  write({"# grip: time_us," + grip_columns() + "\n", "# grip: 100.0,nonsense\n", "# grip: 200.0," + row + "\n", "# grip: 300.0," + row});
   GripRowReader strict(path_, false);
   try {
     strict.next();
@@ -141,16 +138,14 @@ TEST_F(GripRowFile, AJointRecordingWithThemIsReadAsOneWithoutByWhoeverDoesNotKno
   wire_info left = test::make_info(0, 0).body.info, right = left;
   std::memcpy(right.serial, "BBBB\0", 5);
   {
-    RecordingWriter writer(make_lines(path_, true, OutputFile::Appears::at_once), {left, right},
-                           {{"grasp_cap", "20 N"}}, 1000000, false);
+    RecordingWriter writer(make_lines(path_, true, OutputFile::Appears::at_once), {left, right}, {{"grasp_cap", "20 N"}}, 1000000, false);
     writer.comment(GRIP_ROW_KEY, 1000000, "time_us," + grip_columns());
     for (std::uint32_t i = 0; i < 10; i++) {
       const double host_us = 1000100 + 1000.0 * i;
       for (std::size_t device : {0u, 1u}) {
         writer.packet(device, test::make_contact(0, 5000 + 1000 * i, i), host_us);
       }
-      writer.comment(GRIP_ROW_KEY, host_us + 500,
-                     fixed(host_us + 500 - 1000000, 1) + "," + grip_cells(row_with_everything()));
+      writer.comment(GRIP_ROW_KEY, host_us + 500, fixed(host_us + 500 - 1000000, 1) + "," + grip_cells(row_with_everything()));
       writer.comment(GRIP_EVENT_KEY, host_us + 500, "1,line\nbroken");
     }
     writer.settle(1004000);

@@ -111,17 +111,15 @@ TEST_F(GripperThreadTest, APortThatVanishedIsOpenedAgainWhereItIsBack) {
 TEST_F(GripperThreadTest, AFaultIsExplained) {
   state_->fault = 9;
   GripperThread thread(open()(), open());
-  EXPECT_TRUE(comes(thread, [](const auto &news) {
-    return news.status && news.status->fault == 9 && news.trouble == "fault 9, text of 9";
-  }));
+  EXPECT_TRUE(
+      comes(thread, [](const auto &news) { return news.status && news.status->fault == 9 && news.trouble == "fault 9, text of 9"; }));
 }
 
 TEST_F(GripperThreadTest, ThatNobodySpokeToItIsToldAndNoFault) {
   state_->was_left_alone = true;
   GripperThread thread(open()(), open());
-  EXPECT_TRUE(comes(thread, [](const auto &news) {
-    return news.status && news.status->fault == 0 && news.trouble == "no command for a second";
-  }));
+  EXPECT_TRUE(
+      comes(thread, [](const auto &news) { return news.status && news.status->fault == 0 && news.trouble == "no command for a second"; }));
   state_->was_left_alone = false;
   EXPECT_TRUE(comes(thread, [](const auto &news) { return news.status && news.trouble.empty(); }));
 }

@@ -9,9 +9,7 @@ constexpr double STIFFNESS_N = 2.0, POWER = 1.6; // of a pad at 1 mm: softer tha
 constexpr double OBJECT_mm = 40.0, CAP_N = 6.0;
 constexpr double PRESSED_mm = OBJECT_mm - 1.0, AIR_mm = OBJECT_mm + 1.0; // widths
 
-static double pad_N(double width_mm) {
-  return STIFFNESS_N * std::pow(std::max(0.5 * (OBJECT_mm - width_mm), 0.0), POWER);
-}
+static double pad_N(double width_mm) { return STIFFNESS_N * std::pow(std::max(0.5 * (OBJECT_mm - width_mm), 0.0), POWER); }
 
 // A gripper that cannot limit its own force to the cap, between two fingertips.
 class Bench {

@@ -97,8 +97,7 @@ TEST(GraspSettings, AGripperWhoseStepExceedsTheCapIsRefused) {
 }
 
 TEST(GraspSettings, ARecordingTellsThemAll) {
-  const Metadata head =
-      settings_metadata(settings_for(any(), {{"fixed", 4}, {"travel-cap", 7.5}, {"margin", 1.4}, {"slid", 1.5}}));
+  const Metadata head = settings_metadata(settings_for(any(), {{"fixed", 4}, {"travel-cap", 7.5}, {"margin", 1.4}, {"slid", 1.5}}));
   const auto has = [&](const std::string &key, const std::string &value) {
     return std::find(head.begin(), head.end(), std::pair(key, value)) != head.end();
   };

@@ -17,9 +17,8 @@ TEST(FeetechPacket, IsThatOfTheManual) {
   EXPECT_EQ(feetech::encoded({.id = 1, .code = feetech::PING}), (Bytes{0xFF, 0xFF, 0x01, 0x02, 0x01, 0xFB}));
   EXPECT_EQ(feetech::encoded({.id = 1, .code = feetech::READ, .parameters = {0x38, 0x02}}),
             (Bytes{0xFF, 0xFF, 0x01, 0x04, 0x02, 0x38, 0x02, 0xBE}));
-  EXPECT_EQ(
-      feetech::encoded({.id = 1, .code = feetech::WRITE, .parameters = {0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03}}),
-      (Bytes{0xFF, 0xFF, 0x01, 0x09, 0x03, 0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03, 0xD5}));
+  EXPECT_EQ(feetech::encoded({.id = 1, .code = feetech::WRITE, .parameters = {0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03}}),
+            (Bytes{0xFF, 0xFF, 0x01, 0x09, 0x03, 0x2A, 0x00, 0x08, 0x00, 0x00, 0xE8, 0x03, 0xD5}));
   Bytes answer = {0xFF, 0xFF, 0x01, 0x04, 0x00, 0x18, 0x05, 0xDD};
   std::size_t skipped = 0;
   const auto packet = feetech::take_packet(&answer, &skipped);
@@ -83,9 +82,7 @@ TEST(Feetech, KnowsAnObjectByWhereItStops) {
   Served simulated(served(MODEL));
   std::unique_ptr<Gripper> gripper = activated(MODEL, simulated);
   simulated.with([](GripperServer &, GripperMotion &motion) {
-    motion.blocked_at = [](double width_mm, double force_N) {
-      return force_N > 0 && width_mm < 40 && (40 - width_mm) * 2 >= force_N;
-    };
+    motion.blocked_at = [](double width_mm, double force_N) { return force_N > 0 && width_mm < 40 && (40 - width_mm) * 2 >= force_N; };
   });
   const GripperStatus status = moved(simulated, *gripper, {.width_mm = 0, .speed_mm_s = 300, .force_N = 8});
   EXPECT_EQ(status.object, true);

@@ -25,9 +25,7 @@ static GripperMotion activated(const char *model) {
 
 /* An object of this width that pushes back with so much a millimetre, as springs do. */
 static auto spring(double width_mm, double stiffness_N_mm) {
-  return [=](double at_mm, double force_N) {
-    return force_N > 0 && at_mm < width_mm && (width_mm - at_mm) * stiffness_N_mm >= force_N;
-  };
+  return [=](double at_mm, double force_N) { return force_N > 0 && at_mm < width_mm && (width_mm - at_mm) * stiffness_N_mm >= force_N; };
 }
 
 TEST(GripperMotion, MovesOnlyOnceActivated) {

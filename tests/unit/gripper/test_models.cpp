@@ -36,8 +36,7 @@ TEST_P(GripperTest, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
       trouble.fault = one.fault;
       trouble.answers = 1;
       simulated_.with([&](GripperServer &server, GripperMotion &) { server.trouble(trouble); });
-      EXPECT_EQ(code_of([&] { polls ? gripper_->poll() : gripper_->move(move); }), one.code)
-          << static_cast<int>(one.fault) << polls;
+      EXPECT_EQ(code_of([&] { polls ? gripper_->poll() : gripper_->move(move); }), one.code) << static_cast<int>(one.fault) << polls;
       EXPECT_TRUE(gripper_->poll().active);
     }
   }
@@ -68,9 +67,7 @@ TEST_P(GripperTest, IsNotActivatedByAMoveAfterItsPowerWasLost) {
  * to be sure was asked again before its own answer had come, one status in thirty was an older one. */
 TEST_P(GripperTest, NoStatusIsOlderThanItsQuestionHoweverLateAnswersCome) {
   constexpr double NEAR_mm = 0.4; // a step, and how far it moves within a poll's own time
-  const auto width_mm = [&] {
-    return simulated_.with([](GripperServer &, GripperMotion &motion) { return motion.reported_width_mm(); });
-  };
+  const auto width_mm = [&] { return simulated_.with([](GripperServer &, GripperMotion &motion) { return motion.reported_width_mm(); }); };
   Random random(7, 0, 0);
   int answers = 0;
   for (int i = 0; i < 2000; i++) {

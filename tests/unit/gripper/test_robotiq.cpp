@@ -8,10 +8,9 @@ using namespace fingertip;
 using namespace fingertip::test;
 using namespace std::chrono_literals;
 
-/* Requests and answers are printed in Robotiq's "2F-85 & 2F-140 Instruction Manual" and "Hand-E Gripper Instruction
- * Manual", section Modbus RTU example; those with function 3 in the "2-Finger Adaptive Gripper" manuals of 2013 and
- * 2016; of one of them the 2013 edition prints the checksum F7 8B beside another, this one is the packet's own. The two
- * lines marked are no examples of theirs. */
+/* Requests and answers are printed in Robotiq's "2F-85 & 2F-140 Instruction Manual" and "Hand-E Gripper Instruction Manual", section Modbus
+ * RTU example; those with function 3 in the "2-Finger Adaptive Gripper" manuals of 2013 and 2016; of one of them the 2013 edition prints
+ * the checksum F7 8B beside another, this one is the packet's own. The two lines marked are no examples of theirs. */
 TEST(RobotiqFrames, AreThoseOfTheManual) {
   Tape tape({
       {"09 04 07 D0 00 03 B1 CE", ""}, // before function 4 no answer comes
@@ -57,8 +56,8 @@ TEST(RobotiqFrames, AreThoseOfTheManual) {
 
 /* The newer manuals' status request and answer. */
 TEST(RobotiqFrames, ReadWithFunctionFour) {
-  Tape tape({{"09 04 07 D0 00 03 B1 CE", "09 04 06 F9 00 00 00 0D 00 17 AA"},
-             {"09 04 07 D0 00 03 B1 CE", "09 04 06 F9 00 00 00 0D 00 17 AA"}});
+  Tape tape(
+      {{"09 04 07 D0 00 03 B1 CE", "09 04 06 F9 00 00 00 0D 00 17 AA"}, {"09 04 07 D0 00 03 B1 CE", "09 04 06 F9 00 00 00 0D 00 17 AA"}});
   {
     std::unique_ptr<Gripper> gripper = opened("hande", tape.port());
     const GripperStatus status = gripper->poll();
@@ -83,8 +82,7 @@ TEST(RobotiqFrames, TheirOwnEchoIsIgnored) {
 TEST(RobotiqFrames, TheSimulatedOneUnderstandsTheManualsFunction23) {
   Served simulated(served("2f85"));
   activated("2f85", simulated)->move({.width_mm = 85, .speed_mm_s = 150});
-  EXPECT_EQ(asked(simulated.port(), "09 17 07 D0 00 02 03 E9 00 02 04 00 E6 3C C8 2D 0C", 9),
-            with_crc("09 17 04 39 00 00 E6"));
+  EXPECT_EQ(asked(simulated.port(), "09 17 07 D0 00 02 03 E9 00 02 04 00 E6 3C C8 2D 0C", 9), with_crc("09 17 04 39 00 00 E6"));
   std::unique_ptr<Gripper> gripper = opened("2f85", simulated.port());
   EXPECT_EQ(wait_for(simulated, *gripper, rests).width_mm, 0.0);
 }
@@ -102,9 +100,7 @@ TEST(Robotiq, GripsAnObjectAndLosesIt) {
   wait_for(simulated, *gripper, is_active);
   EXPECT_EQ(gripper->poll().fault, 0);
   simulated.with([](GripperServer &, GripperMotion &motion) {
-    motion.blocked_at = [](double width_mm, double force_N) {
-      return force_N > 0 && (40 - width_mm) * 10 >= force_N && width_mm < 40;
-    };
+    motion.blocked_at = [](double width_mm, double force_N) { return force_N > 0 && (40 - width_mm) * 10 >= force_N && width_mm < 40; };
   });
   GripperStatus status = moved(simulated, *gripper, {.width_mm = 0, .speed_mm_s = 150, .force_N = 20});
   EXPECT_EQ(status.object, true);
@@ -125,8 +121,7 @@ TEST(Robotiq, WidthsOfAllModels) {
     for (double part : {0.5, 0.25, 0.0, 1.0}) {
       const GripperStatus status = moved(simulated, *gripper, {.width_mm = part * traits.stroke_mm, .speed_mm_s = 1e6});
       EXPECT_NEAR(status.width_mm, part * traits.stroke_mm, traits.step_mm / 2 + 1e-9) << model;
-      EXPECT_NEAR(simulated.with([](GripperServer &, GripperMotion &motion) { return motion.width_mm(); }),
-                  status.width_mm, 1e-9);
+      EXPECT_NEAR(simulated.with([](GripperServer &, GripperMotion &motion) { return motion.width_mm(); }), status.width_mm, 1e-9);
     }
   }
 }
@@ -202,9 +197,7 @@ TEST(Robotiq, TheSimulatedOneFaultsAsDocumented) {
   EXPECT_EQ(fault(), "05");
   std::unique_ptr<Gripper> gripper = opened("2f85", simulated.port());
   /* Then it goes where it was told to. */
-  EXPECT_EQ(wait_for(simulated, *gripper, [](const GripperStatus &status) { return status.active && !status.moving; })
-                .width_mm,
-            0.0);
+  EXPECT_EQ(wait_for(simulated, *gripper, [](const GripperStatus &status) { return status.active && !status.moving; }).width_mm, 0.0);
 }
 
 TEST(Robotiq, RefusesWhatCannotBe) {
@@ -217,13 +210,10 @@ TEST(Robotiq, RefusesWhatCannotBe) {
   EXPECT_EQ(code_of([&] { opened("2f85", "/dev/null"); }), ErrorCode::not_a_port);
   EXPECT_EQ(code_of([&] { opened("2f85", simulated.port()); }), ErrorCode::port_in_use);
   gripper.reset();
-  EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .slave = 10}); }),
-            ErrorCode::gripper_silent);
-  EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .slave = 300}); }),
-            ErrorCode::bad_value);
+  EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .slave = 10}); }), ErrorCode::gripper_silent);
+  EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .slave = 300}); }), ErrorCode::bad_value);
   for (int closed : {3, 2, 256, -1}) {
-    EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .closed_count = closed}); }),
-              ErrorCode::bad_value);
+    EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = simulated.port(), .closed_count = closed}); }), ErrorCode::bad_value);
   }
 }
 

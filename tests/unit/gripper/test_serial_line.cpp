@@ -25,8 +25,8 @@ protected:
     std::ofstream(path) << text << "\n";
   }
 
-  void plug_in(const std::string &place, const std::string &tty, const std::string &vendor,
-               const std::string &product_id, const std::string &product, const std::string &timer_ms) const {
+  void plug_in(const std::string &place, const std::string &tty, const std::string &vendor, const std::string &product_id,
+               const std::string &product, const std::string &timer_ms) const {
     const fs::path usb = root_ / "sys/devices/usb1" / place, interface = usb / (place + ":1.0");
     write(usb / "idVendor", vendor);
     write(usb / "idProduct", product_id);

@@ -24,8 +24,7 @@ struct Device {
 
 constexpr double HOST_us = 5e12; /* two months of uptime */
 
-/* Exchanges every 100 ms, after a burst, and the largest error of any frame after that, us; the
- * bound must hold at every exchange. */
+/* Exchanges every 100 ms, after a burst, and the largest error of any frame after that, us; the bound must hold at every exchange. */
 static double worst_error_us(const Device &device, double seconds, std::uint64_t seed, double burst_us = 0) {
   ClockFit fit;
   double worst = 0;
@@ -53,8 +52,7 @@ static double worst_error_us(const Device &device, double seconds, std::uint64_t
 
 constexpr double UNCERTAINTY_us = 80;
 
-/* Devices on one wire, and what a recorder knows of their clocks: wrong by up to its bound, and
- * another estimate ten times a second. */
+/* Devices on one wire, and what a recorder knows of their clocks: wrong by up to its bound, and another estimate ten times a second. */
 class Bench {
 public:
   explicit Bench(std::vector<Device> devices) : devices_(std::move(devices)), alignment_(devices_.size()) {}

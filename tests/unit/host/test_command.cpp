@@ -77,8 +77,7 @@ TEST(Command, WhatTravelsWithASettingStaysAsItIs) {
   wire_info now{};
   now.slip_threshold_mm = 0.75f;
   now.slip_window_ms = 100;
-  auto commands = setting_commands(
-      {setting_from_text("slip_window=250"), setting_from_text("limit=1"), setting_from_text("limit=2")}, now);
+  auto commands = setting_commands({setting_from_text("slip_window=250"), setting_from_text("limit=1"), setting_from_text("limit=2")}, now);
   ASSERT_EQ(commands.size(), 2u);
   EXPECT_EQ(decoded(commands[0]).body.cmd_slip.threshold_mm, 0.75f);
   EXPECT_EQ(decoded(commands[0]).body.cmd_slip.window_ms, 250);

@@ -8,9 +8,7 @@
 
 using namespace fingertip;
 
-static Bytes frame(std::uint16_t sequence) {
-  return frame_bytes(test::make_contact(sequence, 1000u * sequence, sequence));
-}
+static Bytes frame(std::uint16_t sequence) { return frame_bytes(test::make_contact(sequence, 1000u * sequence, sequence)); }
 
 static Bytes joined(std::initializer_list<Bytes> parts) {
   Bytes all;
@@ -76,9 +74,8 @@ TEST(Decoder, AfterARestartAnySequenceIsFine) {
 }
 
 TEST(Framing, AgreesWithTheCodecOfTheFirmware) {
-  for (wire_packet packet :
-       {test::make_contact(7, 1u << 20, 3), test::make_raw(300, 5, 9, FT_MAX_SENSORS), test::make_info(1, 2),
-        test::make_health(0xFFFF, 3), test::make_ack(0, 1, 0x80, 0, 2, 3)}) {
+  for (wire_packet packet : {test::make_contact(7, 1u << 20, 3), test::make_raw(300, 5, 9, FT_MAX_SENSORS), test::make_info(1, 2),
+                             test::make_health(0xFFFF, 3), test::make_ack(0, 1, 0x80, 0, 2, 3)}) {
     Bytes frame = frame_bytes(packet);
     auto envelope = Envelope::opened(Bytes(frame.begin(), frame.end() - 1));
     ASSERT_TRUE(envelope);

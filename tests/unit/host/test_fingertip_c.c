@@ -26,9 +26,7 @@ struct numbers {
   double of[FINGERTIP_VALUES_MOST];
 };
 
-static void set(struct numbers *numbers, uint8_t type, const char *name, double value) {
-  numbers->of[at(type, name)] = value;
-}
+static void set(struct numbers *numbers, uint8_t type, const char *name, double value) { numbers->of[at(type, name)] = value; }
 
 static struct numbers contact_of(double frame, double t_us) {
   struct numbers numbers = {{0}};
@@ -86,8 +84,7 @@ TEST(every_packet_comes_back_as_its_numbers) {
     uint8_t frame[FINGERTIP_FRAME_MOST], again[FINGERTIP_FRAME_MOST];
     size_t length = 0, length_again = 0;
     TEST_ASSERT_EQUAL_INT(FT_OK, encode(&packet, frame, &length));
-    TEST_ASSERT_EQUAL_size_t(
-        length, fingertip_decoder_feed(decoder, frame, length, values, 1 + FINGERTIP_VALUES_MOST, &filled));
+    TEST_ASSERT_EQUAL_size_t(length, fingertip_decoder_feed(decoder, frame, length, values, 1 + FINGERTIP_VALUES_MOST, &filled));
     TEST_ASSERT_EQUAL_size_t(1 + fingertip_value_count(*type), filled);
     TEST_ASSERT_TRUE(values[0] == *type);
     OK(fingertip_encode(*type, values + 1, filled - 1, again, FINGERTIP_FRAME_MOST, &length_again));
@@ -135,9 +132,8 @@ TEST(what_no_packet_may_hold_is_refused_by_its_name) {
     uint8_t unwritten[FINGERTIP_FRAME_MOST];
     size_t before = 7;
     set(&numbers, wrong[i].type, wrong[i].name, wrong[i].value);
-    TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_VALUE,
-                          fingertip_encode(wrong[i].type, numbers.of, fingertip_value_count(wrong[i].type), unwritten,
-                                           sizeof unwritten, &before));
+    TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_VALUE, fingertip_encode(wrong[i].type, numbers.of, fingertip_value_count(wrong[i].type), unwritten,
+                                                                sizeof unwritten, &before));
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(fingertip_error(), wrong[i].name), fingertip_error());
     TEST_ASSERT_EQUAL_size_t(7, before);
   }
@@ -147,8 +143,7 @@ TEST(what_no_packet_may_hold_is_refused_by_its_name) {
   size_t length = 0;
   const size_t count = fingertip_value_count(INFO);
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_VALUE, fingertip_encode(INFO, info.of, count, frame, sizeof frame, &length));
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT,
-                        fingertip_encode(INFO, info.of, count - 1, frame, sizeof frame, &length));
+  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT, fingertip_encode(INFO, info.of, count - 1, frame, sizeof frame, &length));
   info = info_of('A');
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT, fingertip_encode(INFO, info.of, count, frame, 20, &length));
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT, fingertip_encode(INFO, NULL, count, frame, sizeof frame, &length));
@@ -168,8 +163,7 @@ TEST(a_full_buffer_takes_no_more_bytes_than_it_has_packets_for) {
   double values[1 + FINGERTIP_VALUES_MOST];
   while (taken < length) {
     size_t filled = 0;
-    const size_t step =
-        fingertip_decoder_feed(decoder, line + taken, length - taken, values, 1 + FINGERTIP_VALUES_MOST, &filled);
+    const size_t step = fingertip_decoder_feed(decoder, line + taken, length - taken, values, 1 + FINGERTIP_VALUES_MOST, &filled);
     TEST_ASSERT_TRUE(step > 0);
     taken += step;
     if (filled > 0) {
@@ -214,8 +208,7 @@ static void put(struct fingertip_writer *writer, size_t device, uint8_t type, st
 static void write_one(enum fingertip_format format) {
   file.length = 0;
   const struct numbers info = info_of('A');
-  struct fingertip_writer *writer =
-      fingertip_writer_new(format, info.of, "recorded_by: a test\nstarted_utc: 2026-08-05T12:00:00.125Z\n");
+  struct fingertip_writer *writer = fingertip_writer_new(format, info.of, "recorded_by: a test\nstarted_utc: 2026-08-05T12:00:00.125Z\n");
   TEST_ASSERT_NOT_NULL_MESSAGE(writer, fingertip_error());
   for (int i = 0; i < 100; i++) {
     put(writer, 0, CONTACT, contact_of(i, 1000 * i), 0);
@@ -225,8 +218,7 @@ static void write_one(enum fingertip_format format) {
   TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_ARGUMENT, fingertip_writer_event(writer, 1, "gone"));
   struct numbers three = raw_of(100, 100000);
   set(&three, RAW, "sensor_count", 3);
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_SENSORS,
-                        fingertip_writer_packet(writer, 0, RAW, three.of, fingertip_value_count(RAW), 0));
+  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_SENSORS, fingertip_writer_packet(writer, 0, RAW, three.of, fingertip_value_count(RAW), 0));
   double counts[FINGERTIP_COUNTS] = {0};
   counts[FINGERTIP_COUNT_PACKETS] = 200;
   OK(fingertip_writer_finish(writer, "stopped", counts));
@@ -251,8 +243,7 @@ static struct found found_in(size_t step, int salvage) {
     double values[FINGERTIP_VALUES_MOST];
     struct fingertip_item item;
     size_t count = 0;
-    while ((found.status = fingertip_reader_next(reader, &item, values, FINGERTIP_VALUES_MOST, &count)) ==
-           FINGERTIP_OK) {
+    while ((found.status = fingertip_reader_next(reader, &item, values, FINGERTIP_VALUES_MOST, &count)) == FINGERTIP_OK) {
       found.contacts += item.type == CONTACT;
       found.raws += item.type == RAW;
       found.infos += item.type == INFO && values[at(INFO, "sensor_count")] == 2;
@@ -419,8 +410,7 @@ TEST(names_are_those_of_the_library) {
   TEST_ASSERT_EQUAL_STRING("0.1", text);
   fingertip_columns(2, text, sizeof text);
   TEST_ASSERT_EQUAL_STRING_LEN("t_us,frame,sequence,flags,", text, 26);
-  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_FIRMWARE,
-                        fingertip_firmware("x.uf2", (const uint8_t *)"UF2", 3, text, text, text, sizeof text));
+  TEST_ASSERT_EQUAL_INT(FINGERTIP_ERR_FIRMWARE, fingertip_firmware("x.uf2", (const uint8_t *)"UF2", 3, text, text, text, sizeof text));
   TEST_ASSERT_EQUAL_STRING("x.uf2: no UF2 file", fingertip_error());
   uint8_t frame[FINGERTIP_FRAME_MOST];
   size_t length = 0;

@@ -30,9 +30,9 @@ static std::vector<std::string> bytewise(const std::string &text) {
 TEST(Keys, PlainOnesComeInOrder) { EXPECT_EQ(keys_of({"qt", "y"}), "qty"); }
 
 TEST(Keys, WhatATerminalAnswersIsNone) {
-  for (const char *answer : {"\x1b[8;24;80t", "\x1b[?2026;2$y", "\x1b[>41;354;0c", "\x1b[Z", "\x1bOt", "\x1b[1;5t",
-                             "\x1b]11;rgb:0000/ttyy/ffff\x1b\\", "\x1b]11;rgb:tt/yy/qq\a", "\x1bP1$r0 t\x1b\\",
-                             "\x1b[I", "\x1bt", "\x1b[12;40R", "\x1b[6n", "\x1b[3~"}) {
+  for (const char *answer :
+       {"\x1b[8;24;80t", "\x1b[?2026;2$y", "\x1b[>41;354;0c", "\x1b[Z", "\x1bOt", "\x1b[1;5t", "\x1b]11;rgb:0000/ttyy/ffff\x1b\\",
+        "\x1b]11;rgb:tt/yy/qq\a", "\x1bP1$r0 t\x1b\\", "\x1b[I", "\x1bt", "\x1b[12;40R", "\x1b[6n", "\x1b[3~"}) {
     EXPECT_EQ(keys_of({answer}), "") << answer + 1;
     EXPECT_EQ(keys_of(bytewise(answer)), "") << answer + 1;
     EXPECT_EQ(keys_of({std::string(answer) + "q"}), "q") << answer + 1;

@@ -12,8 +12,8 @@
 
 using namespace fingertip;
 
-constexpr std::uint32_t FITTED = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID |
-                                 CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED;
+constexpr std::uint32_t FITTED =
+    CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SLIP_VALID | CONTACT_FLAG_TARED;
 
 static Model model_with_info() {
   Model model;
@@ -43,8 +43,8 @@ struct Pull {
 };
 
 /* A contact of 5.7 mm and 5 N, and what the sensors under it measure. */
-static void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_mm, float y_mm, float force_N,
-                       std::uint32_t flags, const Pull &pull = {}) {
+static void take_frame(Model &model, std::uint64_t t_us, std::uint32_t frame, float x_mm, float y_mm, float force_N, std::uint32_t flags,
+                       const Pull &pull = {}) {
   constexpr float sigma_mm = 5.7f, pi = 3.14159265f;
   float p0_Pa = force_N / (2 * pi * sigma_mm * sigma_mm * 1e-6f);
   wire_packet contact = test::make_contact(0, t_us, frame);
@@ -93,9 +93,7 @@ static std::string text_of(const Canvas &canvas) {
   return text;
 }
 
-static bool shows(const Canvas &canvas, const std::string &text) {
-  return text_of(canvas).find(text) != std::string::npos;
-}
+static bool shows(const Canvas &canvas, const std::string &text) { return text_of(canvas).find(text) != std::string::npos; }
 
 static Canvas one(const Model &model, int columns = 80, int rows = 24) {
   return draw_monitor({model}, {"keys", "note", ""}, columns, rows);
@@ -114,9 +112,8 @@ static Sent sent_in_ten_seconds(int columns, int rows, std::uint32_t flags) {
   constexpr int rate_per_s = 400, per_picture = 16;
   for (std::uint32_t frame = 0; frame < 10 * rate_per_s; frame++) {
     float t_s = static_cast<float>(frame) / rate_per_s;
-    take_frame(model, 1000000 + frame * (1000000 / rate_per_s), frame, 8 * std::cos(3.14f * t_s),
-               16 * std::sin(3.14f * t_s), 5 + 4 * std::sin(t_s), flags,
-               {2 * std::cos(5 * t_s), 2 * std::sin(5 * t_s), 0.2f});
+    take_frame(model, 1000000 + frame * (1000000 / rate_per_s), frame, 8 * std::cos(3.14f * t_s), 16 * std::sin(3.14f * t_s),
+               5 + 4 * std::sin(t_s), flags, {2 * std::cos(5 * t_s), 2 * std::sin(5 * t_s), 0.2f});
     if (frame % per_picture == 0) {
       Canvas canvas = one(model, columns, rows);
       sent.changes += painter.paint(canvas).size();
@@ -143,9 +140,8 @@ TEST(Monitor, SendsATenthOfWhatFullPicturesTook) {
   EXPECT_LE(sent_in_ten_seconds(200, 60, FITTED | CONTACT_FLAG_UNCERTAIN).changes, before / 10);
   Sent pulled = sent_in_ten_seconds(200, 60, PULLED);
   EXPECT_LE(pulled.changes, before / 10) << "an arrow that turns with it";
-  report("{\n  \"monitor_200x60_10_s_bytes\": " + std::to_string(sent.changes) +
-         ",\n  \"monitor_200x60_10_s_bytes_of_grasp\": " + std::to_string(pulled.changes) +
-         ",\n  \"monitor_200x60_10_s_bytes_of_full_pictures\": " + std::to_string(sent.all) + "\n}\n");
+  report("{\n  \"monitor_200x60_10_s_bytes\": " + std::to_string(sent.changes) + ",\n  \"monitor_200x60_10_s_bytes_of_grasp\": " +
+         std::to_string(pulled.changes) + ",\n  \"monitor_200x60_10_s_bytes_of_full_pictures\": " + std::to_string(sent.all) + "\n}\n");
 }
 
 TEST(Monitor, SendsNothingWhereNothingChanged) {
@@ -167,10 +163,9 @@ TEST(Monitor, ADoubtfulLocationLooksDoubtful) {
   EXPECT_TRUE(shows(good, "┼"));
   Model all = model_with_info();
   take_frame(all, 1000000, 1, 1, 2, 5, 0x7FFFF);
-  for (std::uint32_t flag :
-       {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_FLAT, CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_MODEL, CONTACT_FLAG_SATURATED,
-        CONTACT_FLAG_FORCE_LOWER_BOUND, CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_AT_BOUND, CONTACT_FLAG_ELONGATED,
-        CONTACT_FLAG_ZERO_DOUBTFUL, CONTACT_FLAG_SENSOR_DOUBTFUL}) {
+  for (std::uint32_t flag : {CONTACT_FLAG_LOW_SIGNAL, CONTACT_FLAG_FLAT, CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_MODEL, CONTACT_FLAG_SATURATED,
+                             CONTACT_FLAG_FORCE_LOWER_BOUND, CONTACT_FLAG_SENSOR_MASKED, CONTACT_FLAG_AT_BOUND, CONTACT_FLAG_ELONGATED,
+                             CONTACT_FLAG_ZERO_DOUBTFUL, CONTACT_FLAG_SENSOR_DOUBTFUL}) {
     EXPECT_TRUE(shows(one(all), flags_text(flag))) << text_of(one(all));
     take_frame(model, 2000000, 2, 4.5f, 4.5f, 5, FITTED | flag);
     Canvas doubtful = one(model);
@@ -276,11 +271,10 @@ TEST(Monitor, EverySizeIsLaidOut) {
   const Model pulled = touched(model_of_grasp(true), 4.5f, 4.5f, PULLED, {-1.5f, 0.2f});
   const std::pair<const Model &, std::vector<const char *>> cases[] = {
       {plain,
-       {"E660583883265A2C", "5.00 N", "x   +4.50", "y   +4.50", "frames/s", "no fit", "NACKs", "convert", "force  ",
-        "x    15 mm┤", "y    24 mm┤", "slip  1 mm┤", "0 s", "keys", "note", "╯"}},
+       {"E660583883265A2C", "5.00 N", "x   +4.50", "y   +4.50", "frames/s", "no fit", "NACKs", "convert", "force  ", "x    15 mm┤",
+        "y    24 mm┤", "slip  1 mm┤", "0 s", "keys", "note", "╯"}},
       {pulled,
-       {"x   +4.50", "qx  -1.50", "qy  +0.20", "Q/F 0.303", "SLIDING", "CONTACT", "force  5 N┤", "2 N┤", "slip  1 mm┤",
-        "0 s", "NACKs"}}};
+       {"x   +4.50", "qx  -1.50", "qy  +0.20", "Q/F 0.303", "SLIDING", "CONTACT", "force  5 N┤", "2 N┤", "slip  1 mm┤", "0 s", "NACKs"}}};
   for (const auto &[model, texts] : cases) {
     for (int columns = 80; columns <= 200; columns += 3) {
       for (int rows = 24; rows <= 60; rows++) {
@@ -468,8 +462,7 @@ TEST(Painter, WithoutColourTheLocationIsStillSeen) {
 }
 
 TEST(Monitor, TwoContactsAndEdgesAreShown) {
-  constexpr std::uint32_t flags =
-      CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_SHAPE_VALID;
+  constexpr std::uint32_t flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_TARED | CONTACT_FLAG_SHAPE_VALID;
   for (int columns : {80, 120}) {
     Model model = model_of_grasp(true);
     wire_packet packet = test::make_contact(0, 1000, 1);

@@ -26,9 +26,7 @@ static std::optional<ErrorCode> refusal(const std::string &path, bool replace) {
   return std::nullopt;
 }
 
-static long files_in(const std::string &folder) {
-  return std::distance(fs::directory_iterator(folder), fs::directory_iterator());
-}
+static long files_in(const std::string &folder) { return std::distance(fs::directory_iterator(folder), fs::directory_iterator()); }
 
 TEST(OutputFile, AnUnfinishedOneLeavesTheOldFile) {
   test::TemporaryFolder folder;

@@ -22,12 +22,11 @@ static Frames frames_of(const std::vector<wire_packet> &packets) {
 }
 
 static std::vector<wire_packet> all_kinds() {
-  return {
-      test::make_info(0, 10),         test::make_ack(1, 20, WIRE_CMD_STREAM, WIRE_RESULT_OUT_OF_RANGE, 65535, ~0ull),
-      test::make_contact(2, 1000, 1), test::make_raw(3, 1000, 1),
-      test::make_contact(4, 2000, 2), /* its raw packet was lost */
-      test::make_contact(6, 3000, 3), test::make_raw(7, 3000, 3),
-      test::make_health(8, 3500),     test::make_raw(10, 4000, 4)}; /* its contact packet was lost */
+  return {test::make_info(0, 10),         test::make_ack(1, 20, WIRE_CMD_STREAM, WIRE_RESULT_OUT_OF_RANGE, 65535, ~0ull),
+          test::make_contact(2, 1000, 1), test::make_raw(3, 1000, 1),
+          test::make_contact(4, 2000, 2), /* its raw packet was lost */
+          test::make_contact(6, 3000, 3), test::make_raw(7, 3000, 3),
+          test::make_health(8, 3500),     test::make_raw(10, 4000, 4)}; /* its contact packet was lost */
 }
 
 constexpr auto AT_ONCE = OutputFile::Appears::at_once;
@@ -108,8 +107,8 @@ TEST(Recording, OverAGonePortNothingIsMissing) {
 }
 
 TEST(Recording, TheEndCountsTheTimeOfEveryRunOfTheDevice) {
-  EXPECT_TRUE(Recorded({test::make_contact(1, 5000000, 1), test::make_contact(2, 7500000, 2),
-                        test::make_contact(1, 1000, 1), test::make_contact(2, 251000, 2)})
+  EXPECT_TRUE(Recorded({test::make_contact(1, 5000000, 1), test::make_contact(2, 7500000, 2), test::make_contact(1, 1000, 1),
+                        test::make_contact(2, 251000, 2)})
                   .has(" frames=4 seconds=2.750000 "));
 }
 
@@ -144,8 +143,7 @@ TEST(Recording, ChangedInfoIsKept) {
                                             plain,        repadded};
   const Recorded recorded(packets);
   EXPECT_EQ(recorded.frames(), frames_of(packets));
-  for (const char *line :
-       {"# gains: 0.86 0.88 ", "# off_x_um: -700 -600 ", "# pad_moment_sds_mm: 4.8537 7.9913 20.39\n"}) {
+  for (const char *line : {"# gains: 0.86 0.88 ", "# off_x_um: -700 -600 ", "# pad_moment_sds_mm: 4.8537 7.9913 20.39\n"}) {
     EXPECT_TRUE(recorded.has(std::string("\n") + line)) << line;
   }
 }
@@ -185,8 +183,7 @@ TEST(Recording, WithoutAFitItsCellsAreEmptyAndNothingIsLost) {
 
 /* The counts of a joint recording, from its lines alone and at its end. */
 LineStatistics counts_of_joint(const std::vector<wire_packet> &packets, bool finish,
-                               const std::function<double(const wire_packet &)> &host_us,
-                               std::vector<std::uint64_t> *t_us = nullptr) {
+                               const std::function<double(const wire_packet &)> &host_us, std::vector<std::uint64_t> *t_us = nullptr) {
   test::TemporaryFolder folder;
   {
     wire_packet one = test::make_info(0, 0), two = test::make_info(0, 0);
@@ -229,8 +226,8 @@ std::vector<wire_packet> everything_in_sequence() {
 
 TEST(Recording, AJointOneInventsNoLosses) {
   for (bool finish : {false, true}) {
-    LineStatistics counts = counts_of_joint(everything_in_sequence(), finish,
-                                            [](const wire_packet &packet) { return static_cast<double>(packet.t_us); });
+    LineStatistics counts =
+        counts_of_joint(everything_in_sequence(), finish, [](const wire_packet &packet) { return static_cast<double>(packet.t_us); });
     EXPECT_EQ(counts.dropped_packets, 0u) << finish;
     EXPECT_EQ(counts.out_of_order, 0u) << finish;
   }
@@ -240,8 +237,7 @@ TEST(Recording, AClockThatJumpsBackTurnsNoRowsAround) {
   std::vector<std::uint64_t> t_us;
   LineStatistics counts = counts_of_joint(
       everything_in_sequence(), false,
-      [](const wire_packet &packet) { return static_cast<double>(packet.t_us) - (packet.t_us > 20000 ? 7500.0 : 0.0); },
-      &t_us);
+      [](const wire_packet &packet) { return static_cast<double>(packet.t_us) - (packet.t_us > 20000 ? 7500.0 : 0.0); }, &t_us);
   EXPECT_TRUE(std::is_sorted(t_us.begin(), t_us.end()));
   EXPECT_EQ(t_us.size(), 50u);
   EXPECT_EQ(counts.out_of_order, 0u);

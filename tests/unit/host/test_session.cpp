@@ -99,8 +99,7 @@ TEST(Session, ARepeatThatIsRefusedWhileTheFirstIsObeyedIsNoRefusal) {
       }
     };
     Session session(line);
-    EXPECT_EQ(error_of([&] { session.command(command_keep(true), QUICK); }).find("refused"),
-              first_is_obeyed ? std::string::npos : 14);
+    EXPECT_EQ(error_of([&] { session.command(command_keep(true), QUICK); }).find("refused"), first_is_obeyed ? std::string::npos : 14);
     EXPECT_EQ(line.commands.size(), 3u);
   }
 }
@@ -121,8 +120,7 @@ TEST(Session, ARefusalIsAnErrorAtOnce) {
   FakeTransport line;
   line.on_command = [&](const wire_packet &command) { line.answer(command, WIRE_RESULT_NOT_NOW); };
   Session session(line);
-  EXPECT_NE(error_of([&] { session.command(command_tare(), QUICK); }).find("refused \"tare\": not possible now"),
-            std::string::npos);
+  EXPECT_NE(error_of([&] { session.command(command_tare(), QUICK); }).find("refused \"tare\": not possible now"), std::string::npos);
   EXPECT_EQ(line.commands.size(), 1u);
 }
 

@@ -205,8 +205,7 @@ TEST_F(Usb, IsSharedAndSeenToGoAndComeBack) {
     std::size_t length = 0;
     device.is_plugged_in = false;
     server.step(milliseconds(0));
-    EXPECT_EQ(static_cast<int>(client.read(bytes, sizeof bytes, &length, milliseconds(1000))),
-              static_cast<int>(Result::gone));
+    EXPECT_EQ(static_cast<int>(client.read(bytes, sizeof bytes, &length, milliseconds(1000))), static_cast<int>(Result::gone));
     server.step(milliseconds(0));
     EXPECT_FALSE(client.reopen());
     device.is_plugged_in = true;

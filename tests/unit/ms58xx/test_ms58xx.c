@@ -38,9 +38,7 @@ static struct reference datasheet(const struct ms58xx_prom *prom, uint32_t d1, u
   struct reference is = {.dT = (int64_t)dT, .first_order_cC = (int64_t)temperature};
   wide below = temperature - 2000;
   if (branch == MS58XX_BRANCH_UNKNOWN) {
-    branch = temperature >= 2000   ? MS58XX_BRANCH_WARM
-             : temperature >= 1000 ? MS58XX_BRANCH_COLD
-                                   : MS58XX_BRANCH_VERY_COLD;
+    branch = temperature >= 2000 ? MS58XX_BRANCH_WARM : temperature >= 1000 ? MS58XX_BRANCH_COLD : MS58XX_BRANCH_VERY_COLD;
   }
   if (branch == MS58XX_BRANCH_COLD) {
     temperature -= divide(12 * dT * dT, (wide)1 << 35);
@@ -59,12 +57,9 @@ static struct reference datasheet(const struct ms58xx_prom *prom, uint32_t d1, u
   return is;
 }
 
-static int32_t saturated(int64_t value) {
-  return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value;
-}
+static int32_t saturated(int64_t value) { return value > INT32_MAX ? INT32_MAX : value < INT32_MIN ? INT32_MIN : (int32_t)value; }
 
-static void assert_equals_datasheet(const struct ms58xx_prom *prom, uint32_t d1, uint32_t d2,
-                                    enum ms58xx_branch previous) {
+static void assert_equals_datasheet(const struct ms58xx_prom *prom, uint32_t d1, uint32_t d2, enum ms58xx_branch previous) {
   struct ms58xx_thermal thermal;
   ms58xx_compensate_temperature(prom, d2, previous, &thermal);
   struct reference is = datasheet(prom, d1, d2, thermal.branch);
@@ -93,8 +88,7 @@ TEST(test_osr_table) {
   static const struct {
     uint16_t osr;
     uint32_t longest_us, noise_mPa;
-  } rows[] = {{256, 560, 11000},  {512, 1100, 6200},  {1024, 2170, 3900},
-              {2048, 4320, 2800}, {4096, 8610, 2100}, {8192, 17200, 1600}};
+  } rows[] = {{256, 560, 11000}, {512, 1100, 6200}, {1024, 2170, 3900}, {2048, 4320, 2800}, {4096, 8610, 2100}, {8192, 17200, 1600}};
   for (uint8_t i = 0; i < 6; i++) {
     const struct ms58xx_osr *row = ms58xx_find_osr(rows[i].osr);
     TEST_ASSERT_NOT_NULL(row);
@@ -107,8 +101,7 @@ TEST(test_osr_table) {
 }
 
 TEST(test_crc_of_an520) {
-  static const uint8_t bytes[16] = {0x31, 0x32, 0x33, 0x34, 0x35, 0x36, 0x37, 0x38,
-                                    0x39, 0x40, 0x41, 0x42, 0x43, 0x44, 0x45, 0x00};
+  static const uint8_t bytes[16] = {0x31, 0x32, 0x33, 0x34, 0x35, 0x36, 0x37, 0x38, 0x39, 0x40, 0x41, 0x42, 0x43, 0x44, 0x45, 0x00};
   TEST_ASSERT_EQUAL_HEX8(0xB, ms58xx_crc4_bytes(bytes));
 }
 
@@ -221,8 +214,7 @@ TEST(test_branch_hysteresis) {
       {V, 1030, C}, {V, 1999, C}, {V, 2000, W}, {0, 2000, W}, {0, 1999, C}, {0, 1000, C}, {0, 999, V},
   };
   for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-    TEST_ASSERT_EQUAL_INT(cases[i].next,
-                          ms58xx_branch_of((enum ms58xx_branch)cases[i].previous, cases[i].temperature_cC));
+    TEST_ASSERT_EQUAL_INT(cases[i].next, ms58xx_branch_of((enum ms58xx_branch)cases[i].previous, cases[i].temperature_cC));
   }
   /* A ramp down and up again changes the branch four times, each beyond its edge. */
   static const int32_t changes_cC[] = {1969, 969, 1030, 2030};
@@ -249,8 +241,8 @@ TEST(test_step_at_ten_degrees_is_not_crossed_by_noise) {
   while (pressure_Pa_q10(&example, d1, at_edge, MS58XX_BRANCH_UNKNOWN) >> 10 > 108000) {
     d1 -= 16;
   }
-  int32_t step_Pa_q10 = pressure_Pa_q10(&example, d1, just_below, MS58XX_BRANCH_UNKNOWN) -
-                        pressure_Pa_q10(&example, d1, at_edge, MS58XX_BRANCH_UNKNOWN);
+  int32_t step_Pa_q10 =
+      pressure_Pa_q10(&example, d1, just_below, MS58XX_BRANCH_UNKNOWN) - pressure_Pa_q10(&example, d1, at_edge, MS58XX_BRANCH_UNKNOWN);
   TEST_ASSERT_INT32_WITHIN(10 * 1024, -60 * 1024, step_Pa_q10);
 
   for (int start = MS58XX_BRANCH_COLD; start <= MS58XX_BRANCH_VERY_COLD; start++) {
@@ -299,8 +291,7 @@ TEST(test_q10_holds_the_datasheets_integer) {
     struct ms58xx_prom prom = example;
     for (int word = 1; word <= 6; word++) {
       /* Half of the parts near the example, half anything. */
-      prom.word[word] =
-          i % 2 ? (uint16_t)random_u32(&random) : (uint16_t)(prom.word[word] - 2000 + random_below(&random, 4001));
+      prom.word[word] = i % 2 ? (uint16_t)random_u32(&random) : (uint16_t)(prom.word[word] - 2000 + random_below(&random, 4001));
     }
     uint32_t d1 = random_below(&random, CODE_MAX + 1);
     uint32_t d2 = i % 2 ? random_below(&random, CODE_MAX + 1) : EXAMPLE_D2 - 1000000 + random_below(&random, 2000001);

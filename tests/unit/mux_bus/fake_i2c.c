@@ -37,9 +37,7 @@ void rp2040_event(void) { fake.events++; }
 
 void fake_i2c_interrupt(void) { owner.on_event(owner.context); }
 
-uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index) {
-  return (uint8_t)(0x35u + 11u * sensor + 3u * command + 71u * index);
-}
+uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index) { return (uint8_t)(0x35u + 11u * sensor + 3u * command + 71u * index); }
 
 static uint32_t open_channels(void) {
   uint32_t sensors = 0;

@@ -51,8 +51,7 @@ void setUp(void) {
 }
 
 static void strike(enum sim_fault_kind kind, uint32_t at, uint32_t count, uint8_t sensor) {
-  array.fault = (struct sim_fault){
-      .kind = kind, .transfer = array.transfers + at, .count = count, .mask = 0x800001, .sensor = sensor};
+  array.fault = (struct sim_fault){.kind = kind, .transfer = array.transfers + at, .count = count, .mask = 0x800001, .sensor = sensor};
 }
 
 TEST(test_a_frame_and_its_bus_time) {

@@ -28,8 +28,7 @@ void setUp(void) {
   TEST_ASSERT_TRUE(command(0x1E, 0));
 }
 
-/* The formulas are judged against the driver's, and those against the datasheet: unit.ms58xx, integration.fault_plan.
- */
+/* The formulas are judged against the driver's, and those against the datasheet: unit.ms58xx, integration.fault_plan. */
 TEST(test_the_inverse_meets_pressure_and_temperature) {
   for (double degC = -10; degC <= 60; degC += 2.5) {
     const uint32_t d2 = sim_ms5840_d2(sensor.prom, degC);

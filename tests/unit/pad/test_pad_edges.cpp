@@ -22,8 +22,7 @@ static twin::BlockTable block(const wire_info &info) {
   for (int k = 0; k < info.sensor_count; k++) {
     sensors.push_back({double(info.x_mm[k]), double(info.y_mm[k])});
   }
-  return twin::BlockTable::load_or_build({twin::silicone(12.0), 9.0 + OVERHANG_mm, 18.0 + OVERHANG_mm}, sensors,
-                                         FINGERTIP_TABLES_DIR);
+  return twin::BlockTable::load_or_build({twin::silicone(12.0), 9.0 + OVERHANG_mm, 18.0 + OVERHANG_mm}, sensors, FINGERTIP_TABLES_DIR);
 }
 
 struct Told {
@@ -33,8 +32,7 @@ struct Told {
 
 /* What the firmware says of a contact 3 mm wide on the pad that ends. The layer's part is written
  * again here, from the formulas of pad_profile.h. */
-static Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, double y_mm, double qx, double qy,
-                 float dip_share) {
+static Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_mm, double y_mm, double qx, double qy, float dip_share) {
   const wire_info info = pad::own_sensors();
   constexpr double FORCE_N = 4.0, SPREAD_mm2 = 3.0;
   std::array<std::int32_t, FT_MAX_SENSORS> readings{};
@@ -88,8 +86,7 @@ static Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_
           double(load.force_N) / FORCE_N};
 }
 
-/* The mean error of Q / F with the edges' coefficients; it was as large without. dip_share: what a calibration has made
- * of the ends. */
+/* The mean error of Q / F with the edges' coefficients; it was as large without. dip_share: what a calibration has made of the ends. */
 static void take_back(const wire_info &info, float dip_share, double was) {
   const pad_profile endless = profile();
   pad_profile mended = endless;

@@ -22,8 +22,7 @@ static pad::Thickness found_on(double layer_mm, const measure::PadOptions &optio
 }
 
 TEST(PadThickness, IsThatOfTheRubber) {
-  const measure::PadOptions like_real{
-      .gain_percent = 20.0, .misplaced_mm = 0.1, .dip_percent = 5.0, .widths_percent = 3.5};
+  const measure::PadOptions like_real{.gain_percent = 20.0, .misplaced_mm = 0.1, .dip_percent = 5.0, .widths_percent = 3.5};
   const measure::PadOptions kinds[] = {{}, USUAL, like_real};
   for (const double layer_mm : {9.0, 12.0, 15.0}) {
     for (std::uint64_t seed = 0; seed < 6; seed++) {

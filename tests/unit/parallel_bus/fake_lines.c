@@ -46,13 +46,9 @@ void fake_lines_power_up(void) {
   fake.opens = true;
 }
 
-uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index) {
-  return (uint8_t)(0x35u + 29u * sensor + 3u * command + 71u * index);
-}
+uint8_t fake_byte(unsigned sensor, uint8_t command, unsigned index) { return (uint8_t)(0x35u + 29u * sensor + 3u * command + 71u * index); }
 
-void fake_lose_its_place(unsigned sensor) {
-  sensors[sensor] = (struct sensor){.state = SEND, .clock = 3, .zeros = true, .low = true};
-}
+void fake_lose_its_place(unsigned sensor) { sensors[sensor] = (struct sensor){.state = SEND, .clock = 3, .zeros = true, .low = true}; }
 
 uint64_t fake_lines_next_event_us(void) { return wave.active && !fake.hangs ? wave.end_us : UINT64_MAX; }
 
@@ -172,8 +168,7 @@ static void take_step(uint16_t step) {
   const uint16_t after = levels();
   const bool scl = after >> BOARD_PIN_SCL & 1;
   const bool scl_changed = ((before ^ after) >> BOARD_PIN_SCL & 1) != 0;
-  misused_if((pulled_before ^ step) >> BOARD_PIN_SCL != 0 && ((pulled_before ^ step) & BOARD_SDA_LINES) != 0,
-             "SCL and SDA at once");
+  misused_if((pulled_before ^ step) >> BOARD_PIN_SCL != 0 && ((pulled_before ^ step) & BOARD_SDA_LINES) != 0, "SCL and SDA at once");
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     if (((pulled_before ^ step) >> k & 1) != 0) {
       check_sda_edge(k, (step >> k & 1) == 0, scl);
@@ -199,8 +194,8 @@ enum ft_status wave_player_open(void) {
 }
 
 void wave_player_start(const uint16_t *steps, uint16_t *samples, unsigned cell_count) {
-  if (misused_if(wave.active || cell_count == 0 || cell_count % 2 != 0 || cell_count > MAX_CELLS ||
-                     (uintptr_t)steps % 4 != 0 || (uintptr_t)samples % 4 != 0,
+  if (misused_if(wave.active || cell_count == 0 || cell_count % 2 != 0 || cell_count > MAX_CELLS || (uintptr_t)steps % 4 != 0 ||
+                     (uintptr_t)samples % 4 != 0,
                  "wave_player_start")) {
     return;
   }

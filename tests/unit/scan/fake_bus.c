@@ -16,8 +16,7 @@ static bool misused_if(struct fake_bus *fake, bool misused, const char *how) {
   return misused;
 }
 
-static enum ft_status start(struct fake_bus *fake, enum fake_operation operation, uint8_t command, uint8_t byte_count,
-                            uint64_t now_us) {
+static enum ft_status start(struct fake_bus *fake, enum fake_operation operation, uint8_t command, uint8_t byte_count, uint64_t now_us) {
   if (misused_if(fake, fake->running && operation != FAKE_RECOVERY, "two operations at once")) {
     return FT_ERR_BUSY;
   }
@@ -31,8 +30,7 @@ static enum ft_status start(struct fake_bus *fake, enum fake_operation operation
   const bool sends = operation != FAKE_RECOVERY;
   misused_if(fake, sends && now_us < fake->ready_us, "something was sent during a conversion");
   misused_if(fake, sends && now_us < fake->powered_us, "something was sent before the PROM was loaded");
-  fake->log[fake->logged++] =
-      (struct fake_entry){operation, command, byte_count, now_us, now_us + duration_us[operation], FT_PENDING};
+  fake->log[fake->logged++] = (struct fake_entry){operation, command, byte_count, now_us, now_us + duration_us[operation], FT_PENDING};
   fake->running = true;
   return FT_OK;
 }
@@ -45,9 +43,7 @@ static enum ft_status start_read(void *context, uint8_t command, uint8_t byte_co
   return start(context, FAKE_READ, command, byte_count, now_us);
 }
 
-static enum ft_status start_recovery(void *context, uint64_t now_us) {
-  return start(context, FAKE_RECOVERY, 0, 0, now_us);
-}
+static enum ft_status start_recovery(void *context, uint64_t now_us) { return start(context, FAKE_RECOVERY, 0, 0, now_us); }
 
 static void answer_prom(struct fake_bus *fake, uint8_t command, struct array_bus_result *result) {
   int word = (command - MS58XX_CMD_READ_PROM) / 2;
@@ -140,8 +136,8 @@ void fake_bus_init(struct fake_bus *fake, struct array_bus *bus, uint8_t sensor_
   fake->fail_with = FT_ERR_TIMEOUT;
   fake->recovery_is = FT_OK;
   for (uint8_t k = 0; k < sensor_count; k++) {
-    fake->prom[k] = (struct ms58xx_prom){
-        {(uint16_t)(0x0040 + k), (uint16_t)(46372 + 31 * k), 43981, 29059, 27842, (uint16_t)(31553 + k), 28165}};
+    fake->prom[k] =
+        (struct ms58xx_prom){{(uint16_t)(0x0040 + k), (uint16_t)(46372 + 31 * k), 43981, 29059, 27842, (uint16_t)(31553 + k), 28165}};
     fake->prom[k].word[0] |= (uint16_t)(ms58xx_prom_crc4(&fake->prom[k]) << 12);
     fake->d1[k] = 6465444u + 1000u * k;
     fake->d2[k] = 8077636u + 150000u;

@@ -27,8 +27,7 @@ extern const struct scan_settings usual;
 void next_case(const struct scan_settings *settings);
 void next_case_of(uint16_t osr, uint32_t rate_mHz);
 
-/* One wake-up of the event context, then the main context. True: a frame was taken. A wake time in
- * the past would be an interrupt storm. */
+/* One wake-up of the event context, then the main context. True: a frame was taken. A wake time in the past would be an interrupt storm. */
 bool step(void);
 void run_until(uint64_t end_us);
 void next_frame(void);

@@ -82,8 +82,7 @@ TEST(test_waits_at_every_osr) {
   }
 }
 
-/* Without drift; wake-ups that come late delay their own frame and no other. The first comes as soon as the sensors are
- * up. */
+/* Without drift; wake-ups that come late delay their own frame and no other. The first comes as soon as the sensors are up. */
 TEST(test_twenty_hertz) {
   for (int late = 0; late < 2; late++) {
     next_case_of(1024, 20000);
@@ -155,8 +154,7 @@ TEST(test_osr_changes_between_frames) {
   assert_good_frame(ALL);
 }
 
-/* A processor that falls behind gets the newest frame, each one it missed is counted, and the
- * conversions keep their time. */
+/* A processor that falls behind gets the newest frame, each one it missed is counted, and the conversions keep their time. */
 TEST(test_frames_that_nobody_takes_are_counted) {
   skip_frames(3);
   uint64_t first_us = frame.t_us;

@@ -35,8 +35,7 @@ TEST(test_a_zero_in_a_frame_that_was_not_taken_asks_for_a_temperature) {
   TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
 }
 
-/* A sensor that missed two reads before all were reset restarts: one more does not cost its
- * admission, as the third in a row would. */
+/* A sensor that missed two reads before all were reset restarts: one more does not cost its admission, as the third in a row would. */
 TEST(test_what_was_missed_before_a_reset_does_not_count_after_it) {
   const uint32_t other = 1u << (SENSORS - 1);
   run_until(3000000);
@@ -69,8 +68,7 @@ TEST(test_replaced_sensor_waits_for_its_own_temperature) {
   fake.prom[DISTURBED] = fake.prom[SENSORS - 1];
   fake.d2[DISTURBED] += 500000;
   fake.answering = ALL;
-  while (count_entries(0x1E, FAKE_COMMAND) < 2 || !scan.conversion->is_temperature ||
-         scan.state != SCAN_WAIT_CONVERSION) {
+  while (count_entries(0x1E, FAKE_COMMAND) < 2 || !scan.conversion->is_temperature || scan.state != SCAN_WAIT_CONVERSION) {
     step();
   }
   fake.zero_next = DISTURBED_BIT;
@@ -311,34 +309,21 @@ TEST(test_random_faults_are_survived) {
     int steps = 0;
     while (now_us < 5000000) {
       switch (random_below(&random, 400)) {
-      case 0:
-        fake.answering = random_u32(&random) & ALL;
-        break;
-      case 1:
-        fake.zero_next = random_u32(&random) & ALL;
-        break;
+      case 0: fake.answering = random_u32(&random) & ALL; break;
+      case 1: fake.zero_next = random_u32(&random) & ALL; break;
       case 2:
         fake.fail_at = (int)random_below(&random, 10);
         fake.fail_with = random_below(&random, 2) ? FT_ERR_TIMEOUT : FT_ERR_STUCK;
         break;
-      case 3:
-        fake.recovery_is = random_below(&random, 2) ? FT_OK : FT_ERR_STUCK;
-        break;
-      case 4:
-        taking = random_below(&random, 2);
-        break;
-      case 5:
-        scan_set_rate_mHz(&scan, random_below(&random, 2000001));
-        break;
-      case 6:
-        TEST_ASSERT_EQUAL_INT(FT_OK, scan_set_osr(&scan, (uint16_t)(256u << random_below(&random, 6))));
-        break;
+      case 3: fake.recovery_is = random_below(&random, 2) ? FT_OK : FT_ERR_STUCK; break;
+      case 4: taking = random_below(&random, 2); break;
+      case 5: scan_set_rate_mHz(&scan, random_below(&random, 2000001)); break;
+      case 6: TEST_ASSERT_EQUAL_INT(FT_OK, scan_set_osr(&scan, (uint16_t)(256u << random_below(&random, 6)))); break;
       case 7:
         fake.misread_prom = random_u32(&random) & ALL;
         fake.misread_passes = (int)random_below(&random, 4);
         break;
-      default:
-        break;
+      default: break;
       }
       step();
       steps++;

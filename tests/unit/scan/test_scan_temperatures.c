@@ -40,8 +40,7 @@ TEST(test_all_sensors_may_be_warmer_after_long) {
   TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND));
 }
 
-/* Two temperatures that agree with each other and with no other sensor: it has lost its state. Its
- * reset makes it the sensor it was. */
+/* Two temperatures that agree with each other and with no other sensor: it has lost its state. Its reset makes it the sensor it was. */
 TEST(test_sensor_that_tells_another_temperature_is_reset) {
   run_until(3000000);
   skip_to_temperature();
@@ -96,8 +95,7 @@ TEST(test_incurable_sensor_is_reset_ever_more_rarely) {
   TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, frame.valid);
   TEST_ASSERT_EQUAL_INT32(0, frame.pressure_Pa_q10[DISTURBED]);
   TEST_ASSERT_INT_WITHIN(1, 1 + 7, count_entries(0x1E, FAKE_COMMAND)); /* 0 1 3 7 15 23 31 s */
-  TEST_ASSERT_EQUAL_UINT32(2 * (uint32_t)(count_entries(0x1E, FAKE_COMMAND) - 1) + 2,
-                           value_of(&scan.counters.implausible_readings));
+  TEST_ASSERT_EQUAL_UINT32(2 * (uint32_t)(count_entries(0x1E, FAKE_COMMAND) - 1) + 2, value_of(&scan.counters.implausible_readings));
   fake.d1[DISTURBED] = fake.d1[DISTURBED + 1];
   run_until(now_us + 9000000);
   assert_good_frame(ALL);
@@ -196,8 +194,7 @@ TEST(test_temperature_fits_into_the_pauses) {
       TEST_ASSERT_LESS_THAN_UINT64(7000, fake.log[next + 2].start_us - fake.log[next].start_us);
       if (n > 4) {
         uint64_t interval_us = fake.log[next].start_us - fake.log[at - 1].start_us;
-        TEST_ASSERT_UINT64_WITHIN(period_us + 10000, (LONGEST_INTERVAL_us + period_us - 1) / period_us * period_us,
-                                  interval_us);
+        TEST_ASSERT_UINT64_WITHIN(period_us + 10000, (LONGEST_INTERVAL_us + period_us - 1) / period_us * period_us, interval_us);
       }
       at = next + 1;
     }

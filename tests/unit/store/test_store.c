@@ -104,8 +104,8 @@ static struct store_content changed(const struct store_content *before, const st
 }
 
 static bool is(const struct store_content *expected) {
-  return store.content.has_calibration == expected->has_calibration &&
-         store.content.has_settings == expected->has_settings && store.content.has_profile == expected->has_profile &&
+  return store.content.has_calibration == expected->has_calibration && store.content.has_settings == expected->has_settings &&
+         store.content.has_profile == expected->has_profile &&
          memcmp(&store.content.calibration, &expected->calibration, sizeof expected->calibration) == 0 &&
          memcmp(&store.content.settings, &expected->settings, sizeof expected->settings) == 0 &&
          memcmp(&store.content.profile, &expected->profile, PROFILE_BYTES) == 0;
@@ -282,8 +282,7 @@ static struct store_content keep_something(void) {
   return content;
 }
 
-/* The newest record, the third one, is damaged: the one before it is not what the user has stored
- * last, so it is not used in its place. */
+/* The newest record, the third one, is damaged: the one before it is not what the user has stored last, so it is not used in its place. */
 TEST(damage_is_told_and_nothing_is_used) {
   static const struct store_content nothing;
   keep_something();

@@ -24,8 +24,7 @@ inline const ContactTable &table_of(const std::string &name) {
   if (const auto found = tables.find(name); found != tables.end()) {
     return found->second;
   }
-  return tables.emplace(name, ContactTable::load_or_build(indenter(name), silicone(LAYER_mm), FINGERTIP_TEST_TABLES))
-      .first->second;
+  return tables.emplace(name, ContactTable::load_or_build(indenter(name), silicone(LAYER_mm), FINGERTIP_TEST_TABLES)).first->second;
 }
 
 inline const TractionTable &traction_of(const std::string &name) {
@@ -50,8 +49,7 @@ inline std::array<double, 15> base_Pa(const Touch &touch, const ContactTable &ta
 }
 
 inline const Phase &phase_of(const Episode &episode, const std::string &name) {
-  return *std::find_if(episode.phases.begin(), episode.phases.end(),
-                       [&](const Phase &one) { return one.name == name; });
+  return *std::find_if(episode.phases.begin(), episode.phases.end(), [&](const Phase &one) { return one.name == name; });
 }
 
 inline Scenario scenario_of(const std::string &kind, const std::function<void(ScenarioOptions &)> &change = {}) {

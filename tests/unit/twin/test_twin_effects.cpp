@@ -56,8 +56,7 @@ static double share_after(Pad &pad, const std::vector<std::pair<double, double>>
   for (std::size_t i = 1; i < corners.size(); i++) {
     const auto [end_s, end_N] = corners[i];
     const auto [begin_s, begin_N] = corners[i - 1];
-    for (; t_s < end_s - 1e-9;
-         share = pad.relaxed_share(t_s, begin_N + (end_N - begin_N) * (t_s - begin_s) / (end_s - begin_s))) {
+    for (; t_s < end_s - 1e-9; share = pad.relaxed_share(t_s, begin_N + (end_N - begin_N) * (t_s - begin_s) / (end_s - begin_s))) {
       t_s += step_s;
     }
   }
@@ -114,8 +113,7 @@ TEST(Effects, NeitherMemoryNorAftereffectDependOnTheStepOrTheScale) {
   for (const char *effect : {"memory", "aftereffect"}) {
     for (std::uint64_t seed = 1; seed <= 8; seed++) {
       Pad fine = pad_with(effect, seed), coarse = pad_with(effect, seed), twice = pad_with(effect, seed);
-      const std::vector<double> a = along(fine, path, 0.001), b = along(coarse, path, 0.1),
-                                c = along(twice, doubled, 0.1);
+      const std::vector<double> a = along(fine, path, 0.001), b = along(coarse, path, 0.1), c = along(twice, doubled, 0.1);
       for (std::size_t i = 0; i < b.size(); i++) {
         EXPECT_NEAR(a[100 * i], b[i], 1e-6) << effect << 0.1 * double(i);
         EXPECT_NEAR(2.0 * b[i], c[i], 1e-6) << effect << 0.1 * double(i);
@@ -145,8 +143,7 @@ TEST(Effects, HysteresisLoopHasItsShareOfTheWorkAtAnySpeedAndSize) {
 
 TEST(Effects, HysteresisRemembersItsLargestPressureAndClosesInnerLoops) {
   Pad pad = pad_with("hysteresis=10");
-  const std::vector<double> readings =
-      along(pad, {{0, 0}, {1, 10000}, {2, 5000}, {3, 8000}, {4, 5000}, {5, 10000}, {6, 12000}}, 0.01);
+  const std::vector<double> readings = along(pad, {{0, 0}, {1, 10000}, {2, 5000}, {3, 8000}, {4, 5000}, {5, 10000}, {6, 12000}}, 0.01);
   EXPECT_NEAR(readings[200], 5000.0 - 0.3 * 5000.0 * 0.5, 1e-6);
   EXPECT_LT(readings[300], 8000.0);
   EXPECT_GT(readings[300], 8000.0 - 0.3 * 2500.0);
@@ -290,8 +287,7 @@ TEST(Effects, DriftIsARampOfTheMeasuredSizeEitherWay) {
   int up = 0, down = 0;
   for (std::uint64_t seed = 0; seed < 20; seed++) {
     Pad pad = pad_with("drift", seed);
-    const std::vector<double> first = reported(pad, 0.0, 0.0), half = reported(pad, 480.0, 0.0),
-                              last = reported(pad, 960.0, 0.0);
+    const std::vector<double> first = reported(pad, 0.0, 0.0), half = reported(pad, 480.0, 0.0), last = reported(pad, 960.0, 0.0);
     for (std::size_t k = 0; k < SENSORS; k++) {
       EXPECT_EQ(first[k], 0.0);
       EXPECT_NEAR(2.0 * half[k], last[k], 1e-9);

@@ -58,8 +58,7 @@ TEST(HeldObject, SticksUntilFrictionGivesWay) {
     bool slips = false;
     double most = 0.0;
     for (long i = 0; i < 40000 && held.way_mm() < 5.0; i++) {
-      held.step(HeldObject::STEP_s, FORCE_N, STIFFNESS_N_mm,
-                ramp(0.0, share * HOLDS_N)(HeldObject::STEP_s * static_cast<double>(i)));
+      held.step(HeldObject::STEP_s, FORCE_N, STIFFNESS_N_mm, ramp(0.0, share * HOLDS_N)(HeldObject::STEP_s * static_cast<double>(i)));
       slips = slips || held.slips();
       most = std::max(most, held.tangential_N() / HOLDS_N);
       EXPECT_LE(held.tangential_N(), HOLDS_N * (1.0 + 1e-9));

@@ -9,9 +9,7 @@ constexpr double MS_s = 1e-3, GRAVITY_m_s2 = 9.81;
 
 static double pull_N(const Touch &touch) { return std::hypot(touch.pull_x_N, touch.pull_y_N); }
 
-static double way_mm(const Touch &from, const Touch &to) {
-  return std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm);
-}
+static double way_mm(const Touch &from, const Touch &to) { return std::hypot(to.x_mm - from.x_mm, to.y_mm - from.y_mm); }
 
 TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
   const Scenario scenario = scenario_of("drag", [](ScenarioOptions &o) {
@@ -25,8 +23,8 @@ TEST(Drag, HoldsAKnownLoadThenSlidesAtFrictionBothWaysAlongBothAxes) {
   std::set<double> frictions;
   for (const Episode &episode : scenario.episodes) {
     const auto at = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s); };
-    const Phase &load = phase_of(episode, "load"), &carry = phase_of(episode, "carry"),
-                &slip = phase_of(episode, "slip"), &after = phase_of(episode, "after");
+    const Phase &load = phase_of(episode, "load"), &carry = phase_of(episode, "carry"), &slip = phase_of(episode, "slip"),
+                &after = phase_of(episode, "after");
     EXPECT_GE(carry.end_s - carry.begin_s, 3.0 - 1e-9);
     const double force_N = at(load.begin_s).force_N, slides_N = episode.friction * force_N;
     EXPECT_EQ(force_N, 3.0);
@@ -194,8 +192,8 @@ TEST(Slide, SticksAndSlipsWhereKineticFrictionIsLow) {
   });
   int most = 0;
   for (const Episode &episode : scenario.episodes) {
-    most = std::max(most, static_cast<int>(std::count_if(episode.phases.begin(), episode.phases.end(),
-                                                         [](const Phase &p) { return p.slip; })));
+    most = std::max(most,
+                    static_cast<int>(std::count_if(episode.phases.begin(), episode.phases.end(), [](const Phase &p) { return p.slip; })));
   }
   EXPECT_GE(most, 4);
 }
@@ -243,8 +241,7 @@ TEST(Screw, WindsUpUntilFrictionGivesWayToBothSides) {
       turns.push_back(angle(one.end_s) - angle(one.begin_s));
       EXPECT_FALSE(one.slip);
     }
-    ASSERT_EQ(names, (std::vector<std::string>{"touch", "hold", "wind", "spin", "wind", "spin", "unwind", "after",
-                                               "release"}));
+    ASSERT_EQ(names, (std::vector<std::string>{"touch", "hold", "wind", "spin", "wind", "spin", "unwind", "after", "release"}));
     const double side = turns[2] > 0.0 ? 1.0 : -1.0;
     sides.insert(turns[2] > 0.0);
     EXPECT_NEAR(turns[2], side * limit_rad, 1e-4);

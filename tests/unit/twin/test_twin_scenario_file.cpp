@@ -18,8 +18,7 @@ struct File {
   std::string bytes;
 
   double at(const std::string &name, double t_s) const {
-    const auto after = std::lower_bound(rows.begin(), rows.end(), t_s,
-                                        [](const std::vector<double> &row, double t) { return row[0] < t; });
+    const auto after = std::lower_bound(rows.begin(), rows.end(), t_s, [](const std::vector<double> &row, double t) { return row[0] < t; });
     const std::size_t c = column.at(name);
     if (after == rows.begin() || after == rows.end()) {
       return (after == rows.begin() ? rows.front() : rows.back())[c];
@@ -64,16 +63,14 @@ TEST(ScenarioFile, ADipIsLowerAroundTheContactAndBelowNothingFarFromIt) {
   const double middle_Pa = table.base_pressure_Pa(5.0, 0.0, 0.0);
   const double width_mm = std::sqrt(5e6 / (2.0 * M_PI * middle_Pa));
   EXPECT_NEAR(table.base_pressure_Pa(5.0, 0.0, 0.0, 0.05), 0.95 * middle_Pa, 1e-6 * middle_Pa);
-  const double off_Pa =
-      table.base_pressure_Pa(5.0, 2.5 * width_mm, 0.0) - table.base_pressure_Pa(5.0, 2.5 * width_mm, 0.0, 0.05);
+  const double off_Pa = table.base_pressure_Pa(5.0, 2.5 * width_mm, 0.0) - table.base_pressure_Pa(5.0, 2.5 * width_mm, 0.0, 0.05);
   EXPECT_NEAR(off_Pa, 0.05 * std::exp(-0.5) * middle_Pa, 1e-6 * middle_Pa);
   EXPECT_LT(table.base_pressure_Pa(5.0, 0.0, 4.0 * width_mm, 0.05), -0.005 * middle_Pa);
   EXPECT_EQ(table.base_pressure_Pa(0.0, 1.0, 1.0, 0.05), 0.0);
 }
 
 TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
-  const BlockTable block =
-      BlockTable::load_or_build(block_around(silicone(LAYER_mm), 6.0), sensor_places(), FINGERTIP_TEST_TABLES);
+  const BlockTable block = BlockTable::load_or_build(block_around(silicone(LAYER_mm), 6.0), sensor_places(), FINGERTIP_TEST_TABLES);
   struct Case {
     const char *kind, *indenter = "sphere6", *tangential = "";
     double dip_share = 0.0, overhang_mm = 0.0;
@@ -123,8 +120,7 @@ TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
             plain_Pa[k] += bare_Pa[k];
             expected_Pa[k] += felt_Pa[k];
             if (one.overhang_mm > 0.0) {
-              expected_Pa[k] +=
-                  block.added_Pa(k, {touch.force_N, touch.pull_x_N, touch.pull_y_N, radius_mm}, touch.x_mm, touch.y_mm);
+              expected_Pa[k] += block.added_Pa(k, {touch.force_N, touch.pull_x_N, touch.pull_y_N, radius_mm}, touch.x_mm, touch.y_mm);
             }
           }
           sum.force_N += touch.force_N;
@@ -140,8 +136,7 @@ TEST(ScenarioFile, IsThePressureOnTheBaseWithinItsTolerance) {
         most_added_Pa = std::max(most_added_Pa, std::abs(expected_Pa[k] - plain_Pa[k]));
       }
       for (std::size_t k = 0; k < 15; k++) {
-        EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s), expected_Pa[k], 0.25 + 1.1e-4 * peak_Pa)
-            << here(t_s);
+        EXPECT_NEAR(file.at("s" + std::to_string(k) + "_Pa", t_s), expected_Pa[k], 0.25 + 1.1e-4 * peak_Pa) << here(t_s);
       }
       const double force_off_N = 2e-4 + 1.1e-4 * sum.force_N;
       EXPECT_NEAR(file.at("force_N", t_s), sum.force_N, force_off_N) << here(t_s);
@@ -190,8 +185,7 @@ TEST(ScenarioFile, HasTheClosestGaussian) {
     double sum = 0.0;
     for (double x = -36.0; x <= 36.0; x += 1.5) {
       for (double y = -36.0; y <= 36.0; y += 1.5) {
-        const double rest =
-            table_of("sphere6").base_pressure_Pa(10.0, x, y) - p0 * std::exp(-(x * x + y * y) / (2 * sigma * sigma));
+        const double rest = table_of("sphere6").base_pressure_Pa(10.0, x, y) - p0 * std::exp(-(x * x + y * y) / (2 * sigma * sigma));
         sum += rest * rest;
       }
     }
@@ -209,8 +203,7 @@ TEST(ScenarioFile, HasTheClosestGaussian) {
 }
 
 TEST(ScenarioFile, ContactsLeaveThePadOnlyByRolling) {
-  const BlockTable block =
-      BlockTable::load_or_build(block_around(silicone(LAYER_mm), 3.0), sensor_places(), FINGERTIP_TEST_TABLES);
+  const BlockTable block = BlockTable::load_or_build(block_around(silicone(LAYER_mm), 3.0), sensor_places(), FINGERTIP_TEST_TABLES);
   ScenarioOptions options;
   options.overhang_mm = 3.0;
   options.seconds = 60;
@@ -219,8 +212,7 @@ TEST(ScenarioFile, ContactsLeaveThePadOnlyByRolling) {
     written(make_scenario(options, table_of("sphere6")), &block);
     ADD_FAILURE() << "a contact left the pad";
   } catch (const Error &error) {
-    EXPECT_NE(std::string(error.what()).find("leaves the pad, which ends at 12.0, 21.0 mm"), std::string::npos)
-        << error.what();
+    EXPECT_NE(std::string(error.what()).find("leaves the pad, which ends at 12.0, 21.0 mm"), std::string::npos) << error.what();
   }
   options.margin_mm = 2.25;
   written(make_scenario(options, table_of("sphere6")), &block);

@@ -57,8 +57,7 @@ TEST(Scenarios, HaveQuietTimeAndNoJumps) {
           // what falls or winds up is a little faster.
           const bool slides = kind.name == "slide", turned = kind.name == "screw";
           EXPECT_LT(std::abs(now.force_N - before.force_N), slides ? 0.6 : 0.3) << kind.name << t_s;
-          EXPECT_LT(std::hypot(now.x_mm - before.x_mm, now.y_mm - before.y_mm), slides ? 0.27 : 0.202)
-              << kind.name << t_s;
+          EXPECT_LT(std::hypot(now.x_mm - before.x_mm, now.y_mm - before.y_mm), slides ? 0.27 : 0.202) << kind.name << t_s;
           EXPECT_LT(std::abs(now.angle_rad - before.angle_rad), turned ? 5e-3 : 3.2e-3) << kind.name << t_s;
           before = now;
         }
@@ -103,8 +102,7 @@ TEST(Scenarios, SlipHasDeadTravelThenSpeed) {
     EXPECT_NEAR(std::abs(y(slip.end_s) - y(dead.begin_s)), 24.0, 1e-6);
     EXPECT_NEAR(dead.end_s - dead.begin_s, 2.0 / episode.speed_mm_s + 0.005, 1.2e-3);
     const double middle_s = 0.5 * (slip.begin_s + slip.end_s);
-    EXPECT_NEAR(std::abs(y(middle_s + 0.01) - y(middle_s - 0.01)) / 0.02, episode.speed_mm_s,
-                0.006 * episode.speed_mm_s);
+    EXPECT_NEAR(std::abs(y(middle_s + 0.01) - y(middle_s - 0.01)) / 0.02, episode.speed_mm_s, 0.006 * episode.speed_mm_s);
   }
   EXPECT_EQ(speeds, (std::set<double>{20, 50, 100, 150, 200}));
 }
@@ -196,8 +194,7 @@ TEST(Scenarios, LiftsTakeAWeightOverWhileTheGripStays) {
     }
     const auto at = [&](double t_s) { return episode.tracks[0].at(t_s - episode.begin_s); };
     const auto pull_N = [&](double t_s) { return std::hypot(at(t_s).pull_x_N, at(t_s).pull_y_N); };
-    const Phase &lift = phase_of(episode, "lift"), &carry = phase_of(episode, "carry"),
-                &lower = phase_of(episode, "lower");
+    const Phase &lift = phase_of(episode, "lift"), &carry = phase_of(episode, "carry"), &lower = phase_of(episode, "lower");
     times_ms.insert(std::lround(1e3 * (lift.end_s - lift.begin_s)));
     EXPECT_NEAR(lower.end_s - lower.begin_s, lift.end_s - lift.begin_s, 1e-9);
     const Touch held = at(lift.begin_s), carried = at(carry.begin_s);

@@ -58,8 +58,7 @@ TEST(WindUp, BeginsLikeASpringAndEndsWhereAllSlides) {
   constexpr double FRICTION_N = 3.0, SHEAR_MPa = 0.19, RADIUS_mm = 2.5;
   const double limit_Nmm = 3.0 * M_PI / 16.0 * FRICTION_N * RADIUS_mm;
   const double spring_Nmm = 16.0 / 3.0 * SHEAR_MPa * std::pow(RADIUS_mm, 3);
-  EXPECT_NEAR(wind_up_rad(1e-3, FRICTION_N, SHEAR_MPa, RADIUS_mm), 1e-3 * limit_Nmm / spring_Nmm,
-              1e-3 * 1e-3 * limit_Nmm / spring_Nmm);
+  EXPECT_NEAR(wind_up_rad(1e-3, FRICTION_N, SHEAR_MPa, RADIUS_mm), 1e-3 * limit_Nmm / spring_Nmm, 1e-3 * 1e-3 * limit_Nmm / spring_Nmm);
   double before = 0.0;
   for (double share = 0.05; share < 1.01; share += 0.05) {
     const double now = wind_up_rad(share, FRICTION_N, SHEAR_MPa, RADIUS_mm);

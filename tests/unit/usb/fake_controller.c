@@ -36,17 +36,15 @@ static struct endpoint *find(uint8_t endpoint) {
   return &fake.endpoints[endpoint & 15][endpoint >> 7];
 }
 
-#define IN_INTERRUPT(call)                                                                                             \
-  do {                                                                                                                 \
-    TEST_ASSERT_FALSE(fake.in_interrupt);                                                                              \
-    fake.in_interrupt = true;                                                                                          \
-    call;                                                                                                              \
-    fake.in_interrupt = false;                                                                                         \
+#define IN_INTERRUPT(call)                                                                                                                 \
+  do {                                                                                                                                     \
+    TEST_ASSERT_FALSE(fake.in_interrupt);                                                                                                  \
+    fake.in_interrupt = true;                                                                                                              \
+    call;                                                                                                                                  \
+    fake.in_interrupt = false;                                                                                                             \
   } while (0)
 
-static void assert_device_context(void) {
-  TEST_ASSERT_TRUE_MESSAGE(fake.in_interrupt, "called outside the interrupt context");
-}
+static void assert_device_context(void) { TEST_ASSERT_TRUE_MESSAGE(fake.in_interrupt, "called outside the interrupt context"); }
 
 /* usb_controller.h ------------------------------------------------------------------------------ */
 
@@ -219,14 +217,8 @@ int host_out(uint8_t endpoint, const void *bytes, size_t length) {
 }
 
 void host_setup(uint8_t type, uint8_t request, uint16_t value, uint16_t index, uint16_t length) {
-  const uint8_t packet[USB_SETUP_BYTES] = {type,
-                                           request,
-                                           (uint8_t)value,
-                                           (uint8_t)(value >> 8),
-                                           (uint8_t)index,
-                                           (uint8_t)(index >> 8),
-                                           (uint8_t)length,
-                                           (uint8_t)(length >> 8)};
+  const uint8_t packet[USB_SETUP_BYTES] = {
+      type, request, (uint8_t)value, (uint8_t)(value >> 8), (uint8_t)index, (uint8_t)(index >> 8), (uint8_t)length, (uint8_t)(length >> 8)};
   for (int in = 0; in < 2; in++) {
     struct endpoint *e = &fake.endpoints[0][in];
     e->stalled = e->held = false;
@@ -254,8 +246,7 @@ int host_control_in(uint8_t type, uint8_t request, uint16_t value, uint16_t inde
   return status < 0 ? status : total;
 }
 
-int host_control_out(uint8_t type, uint8_t request, uint16_t value, uint16_t index, const void *bytes,
-                     uint16_t length) {
+int host_control_out(uint8_t type, uint8_t request, uint16_t value, uint16_t index, const void *bytes, uint16_t length) {
   host_setup(type, request, value, index, length);
   for (uint16_t done = 0; done < length;) {
     size_t n = length - done < 64 ? (size_t)(length - done) : 64;

@@ -1,6 +1,5 @@
-/* A USB controller with a host at its other end, for tests: usb_controller.h is implemented here, and host_ functions
- * do single transactions the way a host does, PIDs included. Any breach of the controller's contract fails the running
- * test. */
+/* A USB controller with a host at its other end, for tests: usb_controller.h is implemented here, and host_ functions do single
+ * transactions the way a host does, PIDs included. Any breach of the controller's contract fails the running test. */
 #pragma once
 
 #include <stdbool.h>

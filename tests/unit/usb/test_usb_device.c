@@ -126,8 +126,7 @@ struct refused {
 static void assert_refused(const struct refused *r, size_t count) {
   for (size_t i = 0; i < count; i++) {
     char message[80];
-    snprintf(message, sizeof message, "%02x %02x %04x %04x %04x", r[i].type, r[i].request, r[i].value, r[i].index,
-             r[i].length);
+    snprintf(message, sizeof message, "%02x %02x %04x %04x %04x", r[i].type, r[i].request, r[i].value, r[i].index, r[i].length);
     host_setup(r[i].type, r[i].request, r[i].value, r[i].index, r[i].length);
     TEST_ASSERT_EQUAL_MESSAGE(HOST_STALL, host_in(0x80, answer), message);
     TEST_ASSERT_EQUAL_MESSAGE(HOST_STALL, host_out(0, NULL, 0), message);
@@ -182,9 +181,8 @@ TEST(test_refused_in_any_state) {
 TEST(test_status_and_interface_questions) {
   enumerate();
   static const struct refused questions[] = {
-      {0x80, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 1, 2},
-      {0x82, GET_STATUS, 0, 0, 2},    {0x82, GET_STATUS, 0, 0x80, 2}, {0x82, GET_STATUS, 0, 0x81, 2},
-      {0x82, GET_STATUS, 0, 0x02, 2}, {0x82, GET_STATUS, 0, 0x82, 2},
+      {0x80, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 0, 2},    {0x81, GET_STATUS, 0, 1, 2},    {0x82, GET_STATUS, 0, 0, 2},
+      {0x82, GET_STATUS, 0, 0x80, 2}, {0x82, GET_STATUS, 0, 0x81, 2}, {0x82, GET_STATUS, 0, 0x02, 2}, {0x82, GET_STATUS, 0, 0x82, 2},
   };
   for (size_t i = 0; i < sizeof questions / sizeof questions[0]; i++) {
     const struct refused *q = &questions[i];

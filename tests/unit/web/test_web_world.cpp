@@ -49,17 +49,15 @@ TEST(Objects, AreTheTwinsTables) {
     const twin::TractionTable traction(table, layer);
     for (const double force_N : {0.5, 3.0, 20.0}) {
       const double peak_Pa = table.base_pressure_Pa(force_N, 0.0, 0.0);
-      EXPECT_NEAR(twin::ForcePlanes::between_forces(read[i].radius_mm, force_N), table.contact_radius_mm(force_N),
-                  1e-4);
+      EXPECT_NEAR(twin::ForcePlanes::between_forces(read[i].radius_mm, force_N), table.contact_radius_mm(force_N), 1e-4);
       double worst_Pa = 0.0, worst_pulled_Pa = 0.0;
       for (double x_mm = -30.0; x_mm <= 30.0; x_mm += 0.7) {
         for (double y_mm = -40.0; y_mm <= 40.0; y_mm += 0.7) {
           const twin::TractionLoad load{force_N, 0.4 * force_N, 0.2 * force_N, -0.15 * force_N};
-          worst_Pa = std::max(
-              worst_Pa, std::abs(read[i].normal.at(force_N, x_mm, y_mm) - table.base_pressure_Pa(force_N, x_mm, y_mm)));
-          worst_pulled_Pa = std::max(
-              worst_pulled_Pa, std::abs(twin::traction_pressure_Pa(read[i].along_x, read[i].along_y, load, x_mm, y_mm) -
-                                        traction.base_pressure_Pa(load, x_mm, y_mm)));
+          worst_Pa = std::max(worst_Pa, std::abs(read[i].normal.at(force_N, x_mm, y_mm) - table.base_pressure_Pa(force_N, x_mm, y_mm)));
+          worst_pulled_Pa =
+              std::max(worst_pulled_Pa, std::abs(twin::traction_pressure_Pa(read[i].along_x, read[i].along_y, load, x_mm, y_mm) -
+                                                 traction.base_pressure_Pa(load, x_mm, y_mm)));
         }
       }
       EXPECT_LT(worst_Pa, 0.004 * peak_Pa) << force_N;
@@ -92,8 +90,7 @@ TEST_F(WorldTest, APressIsTheTwins) {
   EXPECT_EQ(world.truth().x_mm, 2.0);
   EXPECT_EQ(world.truth().y_mm, -3.0);
   EXPECT_EQ(pull_N(), 0.0);
-  const auto table = twin::ContactTable::load_or_build(twin::indenter(object_names()[0]), twin::silicone(PAD_mm),
-                                                       FINGERTIP_TEST_TABLES);
+  const auto table = twin::ContactTable::load_or_build(twin::indenter(object_names()[0]), twin::silicone(PAD_mm), FINGERTIP_TEST_TABLES);
   const double x_mm = static_cast<double>(geometry.x_mm[MIDDLE]) - 2.0;
   const double y_mm = static_cast<double>(geometry.y_mm[MIDDLE]) + 3.0;
   EXPECT_NEAR(pressure_Pa, table.base_pressure_Pa(6.0, x_mm, y_mm), 0.004 * table.base_pressure_Pa(6.0, 0.0, 0.0));
@@ -126,10 +123,8 @@ TEST_F(WorldTest, WhatIsDraggedSticksGivesThenSlips) {
   EXPECT_GT(most_N, 0.9 * FRICTION * 6.0);
   EXPECT_TRUE(world.truth().slips);
   // At a steady speed the law of friction (twin/held_object.hpp) is in balance.
-  const double speed_mm_s = 2.0,
-               rested = 1.0 / (1.0 + twin::HeldObject::HEALS_s * speed_mm_s / twin::HeldObject::SETTLES_mm);
-  EXPECT_NEAR(world.truth().qy_N, (World::KINETIC_SHARE + (1.0 - World::KINETIC_SHARE) * rested) * FRICTION * 6.0,
-              0.01 * FRICTION * 6.0);
+  const double speed_mm_s = 2.0, rested = 1.0 / (1.0 + twin::HeldObject::HEALS_s * speed_mm_s / twin::HeldObject::SETTLES_mm);
+  EXPECT_NEAR(world.truth().qy_N, (World::KINETIC_SHARE + (1.0 - World::KINETIC_SHARE) * rested) * FRICTION * 6.0, 0.01 * FRICTION * 6.0);
 }
 
 TEST_F(WorldTest, MoreFrictionHolds) {
@@ -227,8 +222,7 @@ TEST(World, PadsHaveTheTwinsErrors) {
   const twin::Pad pad({{"gain", 10.0}}, geometry.sensor_count, PAD_mm, AMBIENT_Pa, 3);
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     const double felt_Pa = plain.pressure_Pa(k, 1000000) - AMBIENT_Pa;
-    EXPECT_NEAR(cast.pressure_Pa(k, 1000000) - AMBIENT_Pa, felt_Pa * (1.0 + pad.gain_errors()[k]),
-                1e-6 * std::abs(felt_Pa) + 1e-6);
+    EXPECT_NEAR(cast.pressure_Pa(k, 1000000) - AMBIENT_Pa, felt_Pa * (1.0 + pad.gain_errors()[k]), 1e-6 * std::abs(felt_Pa) + 1e-6);
   }
 }
 

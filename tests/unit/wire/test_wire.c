@@ -6,17 +6,13 @@ static size_t body_length(const struct wire_packet *packet) {
   static const struct {
     uint32_t flag;
     uint8_t length;
-  } of_flags[] = {
-      {CONTACT_FLAG_FIT_VALID, 28},    {CONTACT_FLAG_UNCERTAINTY_VALID, 8}, {CONTACT_FLAG_SLIP_VALID, 4},
-      {CONTACT_FLAG_WIDTHS_VALID, 12}, {CONTACT_FLAG_TANGENTIAL_VALID, 16}, {CONTACT_FLAG_VELOCITY_VALID, 8},
-      {CONTACT_FLAG_SHAPE_VALID, 4},   {CONTACT_FLAG_TWO_CONTACTS, 40},     {CONTACT_FLAG_EDGE, 12}};
-  static const uint8_t fixed[256] = {[WIRE_ACK] = 12,       [WIRE_CRASH] = 97,
-                                     [WIRE_SYNC] = 5,       [WIRE_CMD_STREAM] = 1,
-                                     [WIRE_CMD_TARE] = 1,   [WIRE_CMD_KEEP] = 1,
-                                     [WIRE_CMD_SYNC] = 1,   [WIRE_CMD_RATE] = 4,
-                                     [WIRE_CMD_LOADER] = 4, [WIRE_CMD_LOCATION_LIMIT] = 4,
-                                     [WIRE_CMD_PRIOR] = 8,  [WIRE_CMD_PAD] = 177,
-                                     [WIRE_CMD_OSR] = 2,    [WIRE_CMD_SLIP] = 6};
+  } of_flags[] = {{CONTACT_FLAG_FIT_VALID, 28},    {CONTACT_FLAG_UNCERTAINTY_VALID, 8}, {CONTACT_FLAG_SLIP_VALID, 4},
+                  {CONTACT_FLAG_WIDTHS_VALID, 12}, {CONTACT_FLAG_TANGENTIAL_VALID, 16}, {CONTACT_FLAG_VELOCITY_VALID, 8},
+                  {CONTACT_FLAG_SHAPE_VALID, 4},   {CONTACT_FLAG_TWO_CONTACTS, 40},     {CONTACT_FLAG_EDGE, 12}};
+  static const uint8_t fixed[256] = {
+      [WIRE_ACK] = 12,      [WIRE_CRASH] = 97,    [WIRE_SYNC] = 5,     [WIRE_CMD_STREAM] = 1, [WIRE_CMD_TARE] = 1,
+      [WIRE_CMD_KEEP] = 1,  [WIRE_CMD_SYNC] = 1,  [WIRE_CMD_RATE] = 4, [WIRE_CMD_LOADER] = 4, [WIRE_CMD_LOCATION_LIMIT] = 4,
+      [WIRE_CMD_PRIOR] = 8, [WIRE_CMD_PAD] = 177, [WIRE_CMD_OSR] = 2,  [WIRE_CMD_SLIP] = 6};
   const struct wire_info *info = &packet->body.info;
   size_t length = 22;
   switch (packet->type) {
@@ -25,19 +21,14 @@ static size_t body_length(const struct wire_packet *packet) {
       length += packet->body.contact.flags & of_flags[i].flag ? of_flags[i].length : 0u;
     }
     return length;
-  case WIRE_RAW:
-    return 23 + 8u * packet->body.raw.sensor_count;
+  case WIRE_RAW: return 23 + 8u * packet->body.raw.sensor_count;
   case WIRE_INFO:
-    return 93u + (info->capabilities & WIRE_CAPABILITY_FIT ? 13 : 0) +
-           (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) + (info->capabilities & WIRE_CAPABILITY_SYNC ? 1 : 0) +
-           8u * info->sensor_count + (info->stored & WIRE_STORED_CALIBRATION ? 23 + 14u * info->sensor_count : 0) +
-           (info->stored & WIRE_STORED_PAD ? 177 : 0);
-  case WIRE_HEALTH:
-    return 72u + (packet->body.health.capabilities & WIRE_CAPABILITY_FIT ? 4 : 0);
-  case WIRE_CMD_CALIBRATE:
-    return 24 + 14u * packet->body.cmd_calibrate.sensor_count;
-  default:
-    return fixed[packet->type];
+    return 93u + (info->capabilities & WIRE_CAPABILITY_FIT ? 13 : 0) + (info->capabilities & WIRE_CAPABILITY_SLIP ? 6 : 0) +
+           (info->capabilities & WIRE_CAPABILITY_SYNC ? 1 : 0) + 8u * info->sensor_count +
+           (info->stored & WIRE_STORED_CALIBRATION ? 23 + 14u * info->sensor_count : 0) + (info->stored & WIRE_STORED_PAD ? 177 : 0);
+  case WIRE_HEALTH: return 72u + (packet->body.health.capabilities & WIRE_CAPABILITY_FIT ? 4 : 0);
+  case WIRE_CMD_CALIBRATE: return 24 + 14u * packet->body.cmd_calibrate.sensor_count;
+  default: return fixed[packet->type];
   }
 }
 
@@ -92,8 +83,7 @@ TEST(test_sets_of_commands) {
   static const struct {
     const struct wire_layout *layouts[20];
     uint8_t types[8]; /* of a capability; none: those of no capability */
-  } sets[] = {{{WIRE_COMMANDS_OF_FIT},
-               {WIRE_CMD_CALIBRATE, WIRE_CMD_ERASE_CALIBRATION, WIRE_CMD_PRIOR, WIRE_CMD_LOCATION_LIMIT}},
+  } sets[] = {{{WIRE_COMMANDS_OF_FIT}, {WIRE_CMD_CALIBRATE, WIRE_CMD_ERASE_CALIBRATION, WIRE_CMD_PRIOR, WIRE_CMD_LOCATION_LIMIT}},
               {{WIRE_COMMANDS_OF_SLIP}, {WIRE_CMD_SLIP}},
               {{WIRE_COMMANDS_OF_TANGENTIAL}, {WIRE_CMD_PAD, WIRE_CMD_ERASE_PAD}},
               {{WIRE_COMMANDS_OF_SYNC}, {WIRE_CMD_SYNC}},
@@ -168,8 +158,7 @@ TEST(test_infinity_and_nan_are_refused_both_ways) {
 }
 
 /* A packet that is 0 but for this byte at this place of its body. */
-static void assert_byte_guarded(bool legal, const struct wire_packet *packet, size_t offset, uint8_t value,
-                                size_t body) {
+static void assert_byte_guarded(bool legal, const struct wire_packet *packet, size_t offset, uint8_t value, size_t body) {
   uint8_t frame[WIRE_MAX_FRAME_BYTES];
   size_t length;
   TEST_ASSERT_EQUAL_INT(legal ? FT_OK : FT_ERR_ARGUMENT, encode(packet, frame, &length));
@@ -205,8 +194,7 @@ TEST(test_text_is_printable) {
   for (int text = 0; text < 4; text++) {
     for (int value = 0; value < 256; value++) {
       struct wire_packet packet = {.type = WIRE_INFO, .body.info.sensor_count = 1};
-      char *texts[] = {packet.body.info.git_hash, packet.body.info.board, packet.body.info.scene,
-                       packet.body.info.serial};
+      char *texts[] = {packet.body.info.git_hash, packet.body.info.board, packet.body.info.scene, packet.body.info.serial};
       texts[text][0] = (char)(uint8_t)value;
       const bool legal = value == 0 || (value >= 0x20 && value <= 0x7E);
       assert_byte_guarded(legal, &packet, offsets[text], (uint8_t)value, 93 + 8);

@@ -87,8 +87,7 @@ static void check(const char *path) {
   const size_t count = fingertip_value_count(type);
   uint8_t frame[WIRE_MAX_FRAME_BYTES];
   size_t length = 0;
-  TEST_ASSERT_EQUAL_INT_MESSAGE(FINGERTIP_OK,
-                                fingertip_encode(type, vector.values, count, frame, sizeof frame, &length), path);
+  TEST_ASSERT_EQUAL_INT_MESSAGE(FINGERTIP_OK, fingertip_encode(type, vector.values, count, frame, sizeof frame, &length), path);
   TEST_ASSERT_EQUAL_size_t_MESSAGE(vector.frame_length, length, path);
   bool is_wide = false;
   for (size_t i = 0; i < count; i++) {

@@ -31,12 +31,9 @@ struct sampler {
 
 static inline uint32_t sample_u32(struct sampler *sampler) {
   switch (sampler->kind) {
-  case SAMPLE_GREATEST:
-    return UINT32_MAX;
-  case SAMPLE_RANDOM:
-    return random_u32(&sampler->random) >> random_below(&sampler->random, 32);
-  default:
-    return 0;
+  case SAMPLE_GREATEST: return UINT32_MAX;
+  case SAMPLE_RANDOM: return random_u32(&sampler->random) >> random_below(&sampler->random, 32);
+  default: return 0;
   }
 }
 
@@ -48,23 +45,18 @@ static inline uint64_t sample_u64(struct sampler *sampler) {
 /* Finite: the extremes, the smallest denormal, -0 and random bits. */
 static inline float sample_f32(struct sampler *sampler) {
   switch (sampler->kind) {
-  case SAMPLE_GREATEST:
-    return FLT_MAX;
-  case SAMPLE_LEAST:
-    return -FLT_MAX;
+  case SAMPLE_GREATEST: return FLT_MAX;
+  case SAMPLE_LEAST: return -FLT_MAX;
   case SAMPLE_RANDOM:
     switch (random_below(&sampler->random, 8)) {
-    case 0:
-      return -0.0f;
-    case 1:
-      return bytes_to_f32(1);
+    case 0: return -0.0f;
+    case 1: return bytes_to_f32(1);
     default: {
       uint32_t bits = random_u32(&sampler->random);
       return bytes_to_f32((bits & 0x7F800000u) == 0x7F800000u ? bits ^ 0x40000000u : bits);
     }
     }
-  default:
-    return 0.0f;
+  default: return 0.0f;
   }
 }
 
@@ -104,12 +96,12 @@ struct value {
   size_t offset;
 };
 
-#define RUN(kind, count, field)                                                                                        \
+#define RUN(kind, count, field)                                                                                                            \
   { kind, count, offsetof(struct wire_packet, body.field) }
-#define LAYOUT(name, of)                                                                                               \
-  if (packet->type == (of)) {                                                                                          \
-    walk.run = name##_runs;                                                                                            \
-    walk.end = name##_runs + sizeof name##_runs / sizeof name##_runs[0];                                               \
+#define LAYOUT(name, of)                                                                                                                   \
+  if (packet->type == (of)) {                                                                                                              \
+    walk.run = name##_runs;                                                                                                                \
+    walk.end = name##_runs + sizeof name##_runs / sizeof name##_runs[0];                                                                   \
   }
 #define EMPTY_LAYOUT(name, of)
 static inline struct walk walk_begin(struct wire_packet *packet) {

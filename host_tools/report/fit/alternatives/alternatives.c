@@ -38,8 +38,7 @@ struct normal {
   real rhs[PARAMETERS];
 };
 
-static bool normalise(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                      struct samples *samples) {
+static bool normalise(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, struct samples *samples) {
   int32_t largest = 0;
   samples->count = 0;
   for (int k = 0; k < array->sensor_count; k++) {
@@ -144,8 +143,8 @@ static real evaluate(const struct samples *samples, const real theta[PARAMETERS]
   return cost;
 }
 
-static void linearise(const struct samples *samples, const real theta[PARAMETERS],
-                      const real exponential[FT_MAX_SENSORS], struct normal *normal) {
+static void linearise(const struct samples *samples, const real theta[PARAMETERS], const real exponential[FT_MAX_SENSORS],
+                      struct normal *normal) {
   real inverse_variance = R(1) / (theta[SIGMA] * theta[SIGMA]);
   real inverse_sigma = R(1) / theta[SIGMA];
   memset(normal, 0, sizeof *normal);
@@ -205,8 +204,7 @@ static void lm(const struct samples *samples, int iterations, real theta[PARAMET
   }
 }
 
-static struct alternative_fit fitted(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
-                                     int iterations,
+static struct alternative_fit fitted(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, int iterations,
                                      void (*iterate)(const struct samples *samples, int iterations, real *theta)) {
   struct samples samples;
   real theta[PARAMETERS], pitch_mm = (real)array->pitch_mm;
@@ -215,8 +213,8 @@ static struct alternative_fit fitted(const struct fit_array *array, const int32_
   }
   guess(&samples, theta);
   iterate(&samples, iterations, theta);
-  return (struct alternative_fit){(double)(theta[X] * pitch_mm), (double)(theta[Y] * pitch_mm),
-                                  (double)(theta[P0] * samples.unit_Pa), (double)(theta[SIGMA] * pitch_mm)};
+  return (struct alternative_fit){(double)(theta[X] * pitch_mm), (double)(theta[Y] * pitch_mm), (double)(theta[P0] * samples.unit_Pa),
+                                  (double)(theta[SIGMA] * pitch_mm)};
 }
 
 ALTERNATIVE(NAMED(alternative_naive_)) { return fitted(array, pressure_Pa_q10, usable, iterations, naive); }

@@ -24,10 +24,10 @@ static struct {
 
 enum { CALL_NEXT_JOB = 1, CALL_START = 2, CALL_STOP = 3 };
 
-#define CALL_DEBUGGER(number)                                                                                          \
-  do {                                                                                                                 \
-    register void *argument __asm("r0") = &job;                                                                        \
-    __asm volatile("bkpt %1" : : "r"(argument), "i"(number) : "memory");                                               \
+#define CALL_DEBUGGER(number)                                                                                                              \
+  do {                                                                                                                                     \
+    register void *argument __asm("r0") = &job;                                                                                            \
+    __asm volatile("bkpt %1" : : "r"(argument), "i"(number) : "memory");                                                                   \
   } while (0)
 
 static struct fit_array layout;
@@ -93,8 +93,7 @@ static struct fit_settings with_dip(void) {
 static void begin_tangential(void) { tangential_state = (struct fit_tangential_state){0}; }
 static void tangential(void) {
   const struct fit_settings settings = with_dip();
-  fit_tangential_estimate(&layout, &pad, job.pressure_Pa_q10, &settings, &contact, &tangential_state,
-                          &tangential_result);
+  fit_tangential_estimate(&layout, &pad, job.pressure_Pa_q10, &settings, &contact, &tangential_state, &tangential_result);
   answer(tangential_result.x_mm, tangential_result.y_mm);
 }
 
@@ -116,11 +115,10 @@ static void shapes(void) {
 }
 #define SHAPES_LATER (2 + (FIT_SHAPES_FRAMES - 2) * FIT_SHAPES_PARTS) /* parts before a frame that answers */
 
-#define RUN_ALTERNATIVE(name)                                                                                          \
-  static void name(void) {                                                                                             \
-    const struct alternative_fit found =                                                                               \
-        alternative_##name(&layout, job.pressure_Pa_q10, job.usable, (int)job.iterations);                             \
-    answer((float)found.x_mm, (float)found.y_mm);                                                                      \
+#define RUN_ALTERNATIVE(name)                                                                                                              \
+  static void name(void) {                                                                                                                 \
+    const struct alternative_fit found = alternative_##name(&layout, job.pressure_Pa_q10, job.usable, (int)job.iterations);                \
+    answer((float)found.x_mm, (float)found.y_mm);                                                                                          \
   }
 RUN_ALTERNATIVE(naive_float)
 RUN_ALTERNATIVE(naive_double)

@@ -21,10 +21,10 @@ enum { CALL_NEXT_JOB = 1, CALL_START = 2, CALL_STOP = 3 };
 enum { FRAME_us = 4854 };
 enum { AMBIENT_Pa_q10 = 101325 * 1024, NOISE_Pa_q10 = 11 * 1024 };
 
-#define CALL_DEBUGGER(number)                                                                                          \
-  do {                                                                                                                 \
-    register void *argument __asm("r0") = &job;                                                                        \
-    __asm volatile("bkpt %1" : : "r"(argument), "i"(number) : "memory");                                               \
+#define CALL_DEBUGGER(number)                                                                                                              \
+  do {                                                                                                                                     \
+    register void *argument __asm("r0") = &job;                                                                                            \
+    __asm volatile("bkpt %1" : : "r"(argument), "i"(number) : "memory");                                                                   \
   } while (0)
 
 static struct condition condition;

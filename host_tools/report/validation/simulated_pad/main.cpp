@@ -47,8 +47,7 @@ public:
     settings.prom_spread = 0.03;
     settings.world = {&pad,
                       [](void *context, unsigned sensor, std::uint64_t t_us) {
-                        return AIR_Pa + static_cast<ValidatedPad *>(context)->pressure_Pa(
-                                            sensor, 1e-6 * static_cast<double>(t_us));
+                        return AIR_Pa + static_cast<ValidatedPad *>(context)->pressure_Pa(sensor, 1e-6 * static_cast<double>(t_us));
                       },
                       nullptr};
     for (std::size_t k = 0; k < SENSORS; k++) {
@@ -116,8 +115,7 @@ private:
       send(command_pad(pad::profile_over_own_sensors({thickness.shown_mm()})));
     }
     send(command_calibrate(
-        calibrating::calibration_of(
-            solution, calibrating::force_scale(array, placements, solution, measure::WEIGHT_N, shape), DATE_s),
+        calibrating::calibration_of(solution, calibrating::force_scale(array, placements, solution, measure::WEIGHT_N, shape), DATE_s),
         SENSORS));
   }
 
@@ -139,8 +137,7 @@ private:
       throw Error("the firmware refused command " + std::to_string(packet.body.ack.command));
     }
     if (!writer_ && packet.type == WIRE_INFO) {
-      writer_.emplace(make_lines(options_.recording, options_.overwrite, OutputFile::Appears::when_finished),
-                      &packet.body.info, SENSORS,
+      writer_.emplace(make_lines(options_.recording, options_.overwrite, OutputFile::Appears::when_finished), &packet.body.info, SENSORS,
                       Metadata{{"recorded_by", "simulated_pad"},
                                {"simulated", "the firmware's code on simulated rubber"},
                                {"fault", options_.fault},
@@ -186,15 +183,10 @@ int run(int argc, char **argv) {
   options.pad.cache = twin::default_cache_directory();
   app.add_option("-o,--output", options.recording, "The recording")->required()->type_name("FILE.csv");
   app.add_option("--truth", options.truth, "Keeps what is true")->type_name("FILE.json");
-  app.add_option("--fault", options.fault, "What is wrong with the pad")
-      ->check(CLI::IsMember(pad_fault_names()))
-      ->capture_default_str();
-  app.add_option("--seed", options.pad.seed, "Of the pad, its fault and the hand")
-      ->type_name("N")
-      ->capture_default_str();
+  app.add_option("--fault", options.fault, "What is wrong with the pad")->check(CLI::IsMember(pad_fault_names()))->capture_default_str();
+  app.add_option("--seed", options.pad.seed, "Of the pad, its fault and the hand")->type_name("N")->capture_default_str();
   CLI::Option *calibrated = app.add_flag("--calibrated", options.calibrated, "The fingertip was calibrated before");
-  app.add_flag("--known-pad", options.knows_pad, "The calibration set the pad's profile, so that pulls are estimated")
-      ->needs(calibrated);
+  app.add_flag("--known-pad", options.knows_pad, "The calibration set the pad's profile, so that pulls are estimated")->needs(calibrated);
   app.add_flag("--plain", options.plain, "Rubber as its profile has it: sensors' gains differ, and nothing else");
   app.add_option("--pull", options.pad.pulling.weight_g, "Mass on a thread that pulls at the end")
       ->check(CLI::Range(10.0, 1000.0))

@@ -85,8 +85,8 @@ void confirm(const CalibrateOptions &options, const std::string &question, const
 class CalibratedDevice {
 public:
   explicit CalibratedDevice(const CalibrateOptions &options)
-      : transport_(open_way(choose_way(options.choice))),
-        session_(*transport_, [this] { return !ending_ && stop_requested(); }), info_(session_.info().body.info) {}
+      : transport_(open_way(choose_way(options.choice))), session_(*transport_, [this] { return !ending_ && stop_requested(); }),
+        info_(session_.info().body.info) {}
   ~CalibratedDevice() {
     if (streaming_) {
       session_.send(command_stream(0));
@@ -105,13 +105,12 @@ public:
   /* Throws Error where a recording is of another fingertip. */
   void check_is(const wire_info &recorded, const std::string &recording) const {
     if (std::strncmp(recorded.serial, info_.serial, WIRE_TEXT_BYTES) != 0) {
-      throw Error(printable(recording) + ": is of fingertip " + text_field(recorded.serial) + ", and this is " +
-                  text_field(info_.serial) + "; calibrate each by its own");
+      throw Error(printable(recording) + ": is of fingertip " + text_field(recorded.serial) + ", and this is " + text_field(info_.serial) +
+                  "; calibrate each by its own");
     }
   }
 
-  /* Streams, with a packet of this type for each frame, until goes_on() is false. Throws Error
-   * where no frames come, Interrupted. */
+  /* Streams, with a packet of this type for each frame, until goes_on() is false. Throws Error where no frames come, Interrupted. */
   void follow(std::uint8_t streams, std::uint8_t of_frames, const std::function<void(const wire_packet &)> &take,
               const std::function<bool()> &goes_on) {
     std::int64_t last_frame_us = steady_now_us();
@@ -174,8 +173,7 @@ private:
 void print_result(const GainSession &work, const calibration &made, std::optional<double> force_N) {
   const Judgement &judgement = work.judgement();
   const calibrating::Scatter before = work.scatter(false), after = work.scatter(true);
-  std::printf("%s, from %zu of %zu placements\n", judgement.text.c_str(), judgement.solution.kept,
-              work.placements().size());
+  std::printf("%s, from %zu of %zu placements\n", judgement.text.c_str(), judgement.solution.kept, work.placements().size());
   print_gains(made, static_cast<std::uint8_t>(work.array().sensors()), judgement.solution.misfit_share);
   std::printf("\nof the placements      before     after\n");
   std::printf("location off by     %6.2f mm %6.2f mm   median\n", before.location_mm, after.location_mm);
@@ -214,8 +212,7 @@ void work_live(CalibratedDevice &device, GainSession &work, ColourMode colour) {
   });
 }
 
-/* What a calibration is of: a session, live or of a recording, that is good, and the fingertip, unless it is only
- * shown. */
+/* What a calibration is of: a session, live or of a recording, that is good, and the fingertip, unless it is only shown. */
 template <typename Session> struct Work {
   std::optional<CalibratedDevice> device;
   std::optional<Session> session;
@@ -276,8 +273,7 @@ template <typename Made> void write(const CalibrateOptions &options, CalibratedD
 
 /* A fingertip that estimates tangential force needs the thickness. If the user has set one, this
  * reports whether it is the one found. Otherwise the pad's profile follows from the one found. */
-void use_thickness(CalibratedDevice &device, const calibration &made,
-                   const std::optional<pad::Thickness> &for_profile) {
+void use_thickness(CalibratedDevice &device, const calibration &made, const std::optional<pad::Thickness> &for_profile) {
   const wire_info &info = device.info();
   const auto found = pad::thickness_of(made);
   if (for_profile) {
@@ -290,8 +286,7 @@ void use_thickness(CalibratedDevice &device, const calibration &made,
       std::fprintf(stderr, "fingertip: %s; fingertip pad takes the one that was found\n", other.c_str());
     }
     if (info.pad.overhang_mm > 0) {
-      std::printf("where the rubber ends, once more: fingertip pad --overhang %s\n",
-                  shortest(info.pad.overhang_mm).c_str());
+      std::printf("where the rubber ends, once more: fingertip pad --overhang %s\n", shortest(info.pad.overhang_mm).c_str());
     }
   }
 }
@@ -340,8 +335,7 @@ void pull_live(CalibratedDevice &device, PullSession &work) {
     print_advice();
   };
   print_advice();
-  device.follow(WIRE_STREAM_CONTACT, WIRE_CONTACT, take,
-                [&] { return work.judgement().state == PullJudgement::State::more; });
+  device.follow(WIRE_STREAM_CONTACT, WIRE_CONTACT, take, [&] { return work.judgement().state == PullJudgement::State::more; });
 }
 
 calibrating::Recorded<PullSession> pull_session_from(const CalibrateOptions &options) {
@@ -365,9 +359,7 @@ calibrating::Recorded<PullSession> pull_session_from(const CalibrateOptions &opt
   }
   if (recorded->session.pulls().empty()) {
     throw Error("not calibrated: " +
-                (weak.empty() || was_ready
-                     ? "no pull was found; leave the object alone for a second, then pull and hold for two"
-                     : weak));
+                (weak.empty() || was_ready ? "no pull was found; leave the object alone for a second, then pull and hold for two" : weak));
   }
   return std::move(*recorded);
 }
@@ -429,8 +421,8 @@ Asked asked_of(const nlohmann::json &text) {
       placement.usable |= k < sensors ? std::uint32_t{1} << k : 0u;
     }
     if (placement.reading_Pa.size() != sensors || placement.rest_Pa.size() != sensors) {
-      throw Error("a placement has " + std::to_string(placement.reading_Pa.size()) + " readings, and there are " +
-                  std::to_string(sensors) + " sensors");
+      throw Error("a placement has " + std::to_string(placement.reading_Pa.size()) + " readings, and there are " + std::to_string(sensors) +
+                  " sensors");
     }
     asked.placements.push_back(std::move(placement));
   }
@@ -470,8 +462,8 @@ nlohmann::json found_in(const Asked &asked) {
                           {"sigma_mm", solution.sigma_mm},
                           {"thickness_mm", thickness.mm},
                           {"thickness_sd_mm", thickness.sd_mm}};
-  if (const auto scale = calibrating::force_scale(asked.array, asked.placements, solution, asked.force_N,
-                                                  calibrating::shape_of(solution))) {
+  if (const auto scale =
+          calibrating::force_scale(asked.array, asked.placements, solution, asked.force_N, calibrating::shape_of(solution))) {
     found["force_scale"] = scale->scale;
     found["force_ratio"] = force_ratio_of(asked.array, thickness.mm);
   }
@@ -515,40 +507,37 @@ CLI::Option *with_weight(CLI::App *command, const std::string &option, double un
 
 void add_calibrate(CommandLine &line) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App *command =
-      line.add("calibrate", "Find the sensors' gains by setting down one weight at some twenty places", [options] {
-        if (options->dry_run && options->from.empty()) {
-          throw WrongUsage("--dry-run goes with --from; without, it asks before it writes");
-        }
-        if (options->placements) {
-          return calibrate_placements();
-        }
-        if (options->drag && !options->force_N) {
-          throw WrongUsage("--drag needs the pull: --weight GRAMS on the string, or --force N");
-        }
-        return run_calibrate(*options);
-      });
+  CLI::App *command = line.add("calibrate", "Find the sensors' gains by setting down one weight at some twenty places", [options] {
+    if (options->dry_run && options->from.empty()) {
+      throw WrongUsage("--dry-run goes with --from; without, it asks before it writes");
+    }
+    if (options->placements) {
+      return calibrate_placements();
+    }
+    if (options->drag && !options->force_N) {
+      throw WrongUsage("--drag needs the pull: --weight GRAMS on the string, or --force N");
+    }
+    return run_calibrate(*options);
+  });
   with_port(command, options->choice);
-  CLI::Option *weight = with_weight(command, "--weight", calibrating::GRAVITY_N_PER_g, options->force_N,
-                                    "Mass of the weight: then forces are calibrated too")
-                            ->type_name("GRAMS");
-  CLI::Option *force =
-      with_weight(command, "--force", 1.0, options->force_N, "The same in newtons")->excludes(weight)->type_name("N");
+  CLI::Option *weight =
+      with_weight(command, "--weight", calibrating::GRAVITY_N_PER_g, options->force_N, "Mass of the weight: then forces are calibrated too")
+          ->type_name("GRAMS");
+  CLI::Option *force = with_weight(command, "--force", 1.0, options->force_N, "The same in newtons")->excludes(weight)->type_name("N");
   CLI::Option *drag = command->add_flag("--drag", options->drag,
                                         "Find the tangential force's scale: the weight hangs on a string that pulls an "
                                         "object level along the pad, several times in each direction");
-  CLI::Option *from = with_value(command, "FILE.csv", "--from", options->from,
-                                 "Use the placements of a recording with pressures, not live ones");
+  CLI::Option *from =
+      with_value(command, "FILE.csv", "--from", options->from, "Use the placements of a recording with pressures, not live ones");
   CLI::Option *dry_run = command->add_flag("--dry-run", options->dry_run, "With --from: only show");
   CLI::Option *yes = command->add_flag("--yes", options->yes, "Write, or erase, without asking");
-  CLI::Option *show = command->add_flag("--show", options->show, "Show the fingertip's calibration")
-                          ->excludes(weight, force, drag, from, dry_run, yes);
+  CLI::Option *show =
+      command->add_flag("--show", options->show, "Show the fingertip's calibration")->excludes(weight, force, drag, from, dry_run, yes);
   command->add_flag("--erase", options->erase, "Erase its calibration, after a question")
       ->excludes(weight, force, drag, from, dry_run, show);
   command
-      ->add_flag(
-          "--placements", options->placements,
-          "For programs: only solve the placements that standard input has, and print the solution, both as JSON")
+      ->add_flag("--placements", options->placements,
+                 "For programs: only solve the placements that standard input has, and print the solution, both as JSON")
       ->excludes(weight, force, drag, from, dry_run, yes, show);
   with_colour(command, options->colour);
 }

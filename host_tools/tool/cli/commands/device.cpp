@@ -35,8 +35,7 @@ std::string reached_text(const Found &found) {
     std::snprintf(place, sizeof place, "usb %03u/%03u", found.usb->bus, found.usb->address);
   }
   return joined(std::vector<std::string>{found.socket.empty() ? "" : "socket " + found.socket,
-                                         found.port.empty() ? "" : (found.usb ? "serial " : "port ") + found.port,
-                                         place},
+                                         found.port.empty() ? "" : (found.usb ? "serial " : "port ") + found.port, place},
                 ", ");
 }
 
@@ -86,8 +85,7 @@ struct Device {
   std::unique_ptr<Transport> transport;
   Session session;
 
-  explicit Device(const Choice &choice)
-      : transport(open_way(choose_way(choice))), session(*transport, patience(*transport, session)) {}
+  explicit Device(const Choice &choice) : transport(open_way(choose_way(choice))), session(*transport, patience(*transport, session)) {}
 };
 
 /* Whether the firmware has what it belongs to, and no other table shows it. */
@@ -194,8 +192,7 @@ public:
       if (!(flags_ & CONTACT_FLAG_CONTACT)) {
         throw;
       }
-      throw Error("not tared, it reports a contact" + force_text() +
-                  "; let go of the pad, or --force where nothing touches it");
+      throw Error("not tared, it reports a contact" + force_text() + "; let go of the pad, or --force where nothing touches it");
     }
     wait_for([this] { return tared_; });
   }
@@ -289,24 +286,21 @@ int pad_command(const PadOptions &options) {
   Session &session = device.session;
   wire_info info = session.info().body.info;
   if (!(info.capabilities & WIRE_CAPABILITY_TANGENTIAL)) {
-    throw Error("its firmware, of scene " + text_field(info.scene) +
-                ", reports no tangential force; install one of scene grasp");
+    throw Error("its firmware, of scene " + text_field(info.scene) + ", reports no tangential force; install one of scene grasp");
   }
   if (options.erase) {
     return erase_pad(session);
   }
   if (options.thickness_mm && *options.thickness_mm < pad::THINNEST_mm) {
-    throw WrongUsage(
-        "on less than 9 mm of rubber the tangential force is not accurate enough; --thickness goes from 9 to 20 mm");
+    throw WrongUsage("on less than 9 mm of rubber the tangential force is not accurate enough; --thickness goes from 9 to 20 mm");
   }
   const pad::Shape shape{thickness_mm(options, info), options.overhang_mm, options.from_touch};
   pad_profile profile = typed([&] { return pad::profile_of(shape, info); });
   const bool ends = shape.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm && shape.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm;
   if (ends) {
     ProgressBar bar("the pad's ends", ProgressBar::Lines::none);
-    profile.edges = typed([&] {
-      return pad::edges_of(profile, info, twin::default_cache_directory(), [&](double share) { bar.show(share); });
-    });
+    profile.edges =
+        typed([&] { return pad::edges_of(profile, info, twin::default_cache_directory(), [&](double share) { bar.show(share); }); });
   }
   session.command(command_pad(profile));
   std::printf("thickness=%s overhang=%s%s%s force_ratio=%s kept\n", shortest(profile.thickness_mm).c_str(),
@@ -350,38 +344,32 @@ void add_info(CommandLine &line) {
 
 void add_set(CommandLine &line) {
   auto options = std::make_shared<SetOptions>();
-  CLI::App *command = line.add("set", "Change settings until the next power-on, or for good with --keep",
-                               [options] { return set(*options); });
+  CLI::App *command =
+      line.add("set", "Change settings until the next power-on, or for good with --keep", [options] { return set(*options); });
   with_port(command, options->choice);
   with_value(command, "KEY=VALUE", "settings", options->settings, settings_help());
-  CLI::Option *keep = command->add_flag("--keep", options->keep,
-                                        "Keep all present settings: the fingertip starts with them from now on");
-  command->add_flag("--forget", options->forget, "Keep none: from its next start on it has the firmware's defaults")
-      ->excludes(keep);
+  CLI::Option *keep = command->add_flag("--keep", options->keep, "Keep all present settings: the fingertip starts with them from now on");
+  command->add_flag("--forget", options->forget, "Keep none: from its next start on it has the firmware's defaults")->excludes(keep);
 }
 
 void add_tare(CommandLine &line) {
   auto options = std::make_shared<TareOptions>();
-  CLI::App *tare_command = line.add("tare", "Measure the zero of every sensor; nothing may touch the pad",
-                                    [options] { return tare(*options); });
+  CLI::App *tare_command =
+      line.add("tare", "Measure the zero of every sensor; nothing may touch the pad", [options] { return tare(*options); });
   with_port(tare_command, options->choice);
-  tare_command->add_flag("--force", options->force,
-                         "Tare even if a contact is reported, though nothing touches the pad");
+  tare_command->add_flag("--force", options->force, "Tare even if a contact is reported, though nothing touches the pad");
 }
 
 void add_pad(CommandLine &line) {
   auto options = std::make_shared<PadOptions>();
-  CLI::App *command =
-      line.add("pad", "Set the pad's profile, for the tangential force (the fingertip keeps it without power)",
-               [options] { return pad_command(*options); });
+  CLI::App *command = line.add("pad", "Set the pad's profile, for the tangential force (the fingertip keeps it without power)",
+                               [options] { return pad_command(*options); });
   with_port(command, options->choice);
-  CLI::Option *thickness =
-      with_value(command, "MM", "--thickness", options->thickness_mm,
-                 "Thickness of the rubber above the sensors, 9 to 20 mm. Default: as the calibration found it");
-  CLI::Option *overhang =
-      with_value(command, "MM", "--overhang", options->overhang_mm,
-                 "How far the rubber extends beyond the outer sensors, up to 100 mm; from 3 to 20 mm the effect "
-                 "of the ends is computed and subtracted. Default: a pad without end");
+  CLI::Option *thickness = with_value(command, "MM", "--thickness", options->thickness_mm,
+                                      "Thickness of the rubber above the sensors, 9 to 20 mm. Default: as the calibration found it");
+  CLI::Option *overhang = with_value(command, "MM", "--overhang", options->overhang_mm,
+                                     "How far the rubber extends beyond the outer sensors, up to 100 mm; from 3 to 20 mm the effect "
+                                     "of the ends is computed and subtracted. Default: a pad without end");
   CLI::Option *from_touch = command->add_flag("--from-touch", options->from_touch,
                                               "Report the change since the first 100 ms of each contact: for pads "
                                               "whose rubber ends within half its thickness of the outer sensors");
@@ -393,9 +381,7 @@ void add_pad(CommandLine &line) {
 
 void add_loader(CommandLine &line) {
   auto choice = std::make_shared<Choice>();
-  with_port(
-      line.add("loader", "Restart into the USB loader, to install firmware", [choice] { return loader(*choice); }),
-      *choice);
+  with_port(line.add("loader", "Restart into the USB loader, to install firmware", [choice] { return loader(*choice); }), *choice);
 }
 
 void add_rule(CommandLine &line) {

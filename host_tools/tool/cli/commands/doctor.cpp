@@ -120,11 +120,9 @@ void measure(Session &session, Facts &facts, const std::string &elf, double seco
   session.command(command_stream(0), PATIENCE);
 }
 
-/* Whatever ends it early is one of the facts, but for an ELF file that was named and is none:
- * Error. stop: asked while waiting; true throws Interrupted. progress: called with the share of the
- * measurement that is over, 0..1. Leaves the streams off. */
-Facts gather(const DoctorOptions &options, const std::function<bool()> &stop,
-             const std::function<void(double)> &progress) {
+/* Whatever ends it early is one of the facts, but for an ELF file that was named and is none: Error. stop: asked while waiting; true throws
+ * Interrupted. progress: called with the share of the measurement that is over, 0..1. Leaves the streams off. */
+Facts gather(const DoctorOptions &options, const std::function<bool()> &stop, const std::function<void(double)> &progress) {
   if (!options.elf.empty()) {
     Symbols::of_file(options.elf);
   }
@@ -158,18 +156,14 @@ bool wants_colour() {
 void print(const std::vector<Finding> &findings) {
   bool colour = wants_colour();
   for (const Finding &finding : findings) {
-    const char *paint = finding.verdict == Verdict::ok     ? "\x1b[32m"
-                        : finding.verdict == Verdict::warn ? "\x1b[33m"
-                                                           : "\x1b[31m";
+    const char *paint = finding.verdict == Verdict::ok ? "\x1b[32m" : finding.verdict == Verdict::warn ? "\x1b[33m" : "\x1b[31m";
     std::string text = finding.text + (finding.advice.empty() ? "" : "; " + finding.advice);
-    std::printf("%s%-4s%s  %-9s  %s\n", colour ? paint : "", verdict_text(finding.verdict).c_str(),
-                colour ? "\x1b[0m" : "", finding.check.c_str(), printable(text).c_str());
+    std::printf("%s%-4s%s  %-9s  %s\n", colour ? paint : "", verdict_text(finding.verdict).c_str(), colour ? "\x1b[0m" : "",
+                finding.check.c_str(), printable(text).c_str());
   }
 }
 
-template <typename Value> Json or_null(const std::optional<Value> &value) {
-  return value ? Json(*value) : Json(nullptr);
-}
+template <typename Value> Json or_null(const std::optional<Value> &value) { return value ? Json(*value) : Json(nullptr); }
 
 Json place_json(const std::optional<Wiring> &wiring, unsigned sensor) {
   Json json = {{"sensor", sensor}};
@@ -211,25 +205,22 @@ Json measured_json(const Facts &facts, const std::optional<Wiring> &wiring) {
 
 Json crash_json(const Crash &crash) {
   const crash_record &record = crash.record;
-  Json json = {{"kind", record.kind},     {"exception", record.exception},
-               {"vector", record.vector}, {"activity", record.activity},
-               {"stuck", record.stuck},   {"uptime_s", static_cast<double>(record.t_us) / 1e6},
-               {"place", crash.place},    {"caller", crash.caller}};
+  Json json = {{"kind", record.kind},         {"exception", record.exception}, {"vector", record.vector},
+               {"activity", record.activity}, {"stuck", record.stuck},         {"uptime_s", static_cast<double>(record.t_us) / 1e6},
+               {"place", crash.place},        {"caller", crash.caller}};
   for (const auto &[name, value] : registers_of(record)) {
     json["registers"][name] = value;
   }
   json["events"] = Json::array();
   for (unsigned i = 0; i < CRASH_EVENTS && record.event_codes[i] != CRASH_EVENT_NONE; i++) {
-    json["events"].push_back(
-        {{"code", record.event_codes[i]}, {"detail", record.event_details[i]}, {"age_s", event_age_s(record, i)}});
+    json["events"].push_back({{"code", record.event_codes[i]}, {"detail", record.event_details[i]}, {"age_s", event_age_s(record, i)}});
   }
   return json;
 }
 
 Json to_json(const Facts &facts, const std::vector<Finding> &findings) {
   std::optional<Wiring> wiring;
-  Json json = {
-      {"tool_version", FINGERTIP_VERSION}, {"verdict", verdict_text(worst_of(findings))}, {"port", facts.port}};
+  Json json = {{"tool_version", FINGERTIP_VERSION}, {"verdict", verdict_text(worst_of(findings))}, {"port", facts.port}};
   if (facts.info) {
     std::string board = text_field(facts.info->board);
     wiring = Wiring::of_board(board);

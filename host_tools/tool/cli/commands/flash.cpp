@@ -95,15 +95,13 @@ public:
       auto board = loader_board(given);
       if (board && *board != "RPI-RP2") {
         throw Error(given + ": the loader of another chip (" + *board + "); " +
-                    (*board == "RP2350" ? "there is no firmware for a Pico 2 yet, take a Pico or a Pico W"
-                                        : "give that of an RP2040"));
+                    (*board == "RP2350" ? "there is no firmware for a Pico 2 yet, take a Pico or a Pico W" : "give that of an RP2040"));
       }
       return board ? std::unique_ptr<Volume>(new Volume(given, false)) : nullptr;
     }
     auto mounted = mounted_volumes();
     if (mounted.size() > 1) {
-      throw Error("several Picos wait for firmware; unplug all but one, or choose with --volume: " + mounted[0] + " " +
-                  mounted[1]);
+      throw Error("several Picos wait for firmware; unplug all but one, or choose with --volume: " + mounted[0] + " " + mounted[1]);
     }
     if (mounted.size() == 1) {
       return std::unique_ptr<Volume>(new Volume(mounted[0], false));
@@ -148,8 +146,7 @@ private:
     if (geteuid() == 0) {
       char folder[] = "/run/fingertip-XXXXXX";
       if (!mkdtemp(folder) || mount(BY_LABEL, folder, "vfat", MS_NOSUID | MS_NODEV | MS_NOEXEC, nullptr) != 0) {
-        throw Error(std::string(BY_LABEL) + ": cannot mount it (" + std::strerror(errno) +
-                    "); mount it, and give its folder as --volume");
+        throw Error(std::string(BY_LABEL) + ": cannot mount it (" + std::strerror(errno) + "); mount it, and give its folder as --volume");
       }
       return std::unique_ptr<Volume>(new Volume(folder, true));
     }
@@ -163,8 +160,7 @@ private:
     }
     int status = 0;
     if (child < 0 || waitpid(child, &status, 0) != child || status != 0) {
-      throw Error("the drive RPI-RP2 is not mounted; sudo mount -o umask=0 " + std::string(BY_LABEL) +
-                  " /mnt, then give --volume /mnt");
+      throw Error("the drive RPI-RP2 is not mounted; sudo mount -o umask=0 " + std::string(BY_LABEL) + " /mnt, then give --volume /mnt");
     }
     auto mounted = mounted_volumes();
     return mounted.empty() ? nullptr : std::unique_ptr<Volume>(new Volume(mounted[0], false));
@@ -182,8 +178,8 @@ std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &im
   try {
     wire_info info = session.info(QUICK).body.info;
     if (text_field(info.board) != image.board) {
-      throw Error(options.file + ": for board " + image.board + ", but fingertip " + text_field(info.serial) +
-                  " is a " + text_field(info.board) + "; give fingertip-" + text_field(info.board) + ".uf2");
+      throw Error(options.file + ": for board " + image.board + ", but fingertip " + text_field(info.serial) + " is a " +
+                  text_field(info.board) + "; give fingertip-" + text_field(info.board) + ".uf2");
     }
     serial = text_field(info.serial);
     session.command(command_loader(), QUICK);
@@ -287,8 +283,7 @@ void add_flash(CommandLine &line) {
   CLI::App *command = line.add("flash", "Install firmware and see it come back", [options] { return flash(*options); });
   with_port(command, options->choice);
   with_value(command, "IMAGE.uf2", "image", options->file, "The firmware, build/BOARD/fingertip-BOARD.uf2")->required();
-  with_value(command, "FOLDER", "--volume", options->volume,
-             "Where the loader's drive RPI-RP2 is mounted; default: found, or mounted");
+  with_value(command, "FOLDER", "--volume", options->volume, "Where the loader's drive RPI-RP2 is mounted; default: found, or mounted");
 }
 
 } // namespace fingertip

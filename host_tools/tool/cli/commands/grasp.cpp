@@ -60,8 +60,7 @@ constexpr milliseconds NEWS_POLL{20};
 constexpr std::int64_t ROW_us = 10000;
 /* A fingertip that starts measures its zero for half a second. */
 constexpr std::int64_t TARING_us = 3000000;
-/* Without a terminal it ends TAIL_us after the grasp, and waits INACTIVE_us at most for a gripper
- * that may not be activated. */
+/* Without a terminal it ends TAIL_us after the grasp, and waits INACTIVE_us at most for a gripper that may not be activated. */
 constexpr std::int64_t TAIL_us = 300000, INACTIVE_us = 2000000;
 
 std::optional<Way> way_of(const std::string &text, Reach reach) {
@@ -166,11 +165,8 @@ private:
       Metadata head = {{"grasp_gripper", line}};
       const Metadata all = settings_metadata(settings_);
       head.insert(head.end(), all.begin(), all.end());
-      recording_.emplace(options_.recording, options_.overwrite, std::vector<DeviceNews>(ready.begin(), ready.end()),
-                         "", zero_us_, head);
-      keep([&] {
-        recording_->writer().comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns());
-      });
+      recording_.emplace(options_.recording, options_.overwrite, std::vector<DeviceNews>(ready.begin(), ready.end()), "", zero_us_, head);
+      keep([&] { recording_->writer().comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns()); });
     }
     loop_.begin(
         std::move(gripper), [way] { return open_gripper(way); }, settings_);
@@ -195,9 +191,8 @@ private:
     try {
       std::map<std::string, double> limits = limits_of(words);
       limits.insert(limits_.begin(), limits_.end());
-      return change(limits) && (!request || wish(*request, request_name(*request)))
-                 ? "ok"
-                 : "error cannot be while it is " + state_name(state());
+      return change(limits) && (!request || wish(*request, request_name(*request))) ? "ok"
+                                                                                    : "error cannot be while it is " + state_name(state());
     } catch (const Error &error) {
       return std::string("error ") + error.what();
     }
@@ -228,8 +223,8 @@ private:
   void check(Gripper &gripper, const std::string &port) const {
     const GripperStatus status = gripper.poll();
     if (status.fault != 0 && !options_.activate) {
-      throw Error(port + ": fault " + std::to_string(status.fault) + " of the gripper, " +
-                  gripper.fault_text(status.fault) + "; --activate clears it, and moves it");
+      throw Error(port + ": fault " + std::to_string(status.fault) + " of the gripper, " + gripper.fault_text(status.fault) +
+                  "; --activate clears it, and moves it");
     }
     if (!status.active && !options_.activate) {
       throw Error(port + ": the gripper is not active; take out what it holds, and let it move with --activate");
@@ -262,25 +257,15 @@ private:
     bool ended = false;
     for (GraspNews &news : loop_.take(NEWS_POLL)) {
       switch (news.kind) {
-      case GraspNews::Kind::device:
-        take_device(*news.device);
-        break;
-      case GraspNews::Kind::step:
-        take_step(news);
-        break;
+      case GraspNews::Kind::device: take_device(*news.device); break;
+      case GraspNews::Kind::step: take_step(news); break;
       case GraspNews::Kind::gripper:
         trouble_ = news.text;
         event("gripper: " + (news.text.empty() ? "answers, without a fault" : news.text));
         break;
-      case GraspNews::Kind::fault:
-        event(fault_ = news.text);
-        break;
-      case GraspNews::Kind::dropped:
-        lost_ = std::to_string(news.count) + " lines not recorded: this program was held up";
-        break;
-      case GraspNews::Kind::ended:
-        ended = true;
-        break;
+      case GraspNews::Kind::fault: event(fault_ = news.text); break;
+      case GraspNews::Kind::dropped: lost_ = std::to_string(news.count) + " lines not recorded: this program was held up"; break;
+      case GraspNews::Kind::ended: ended = true; break;
       }
     }
     keep([&] { recording_->writer().settle(settled_us - SETTLE_us); });
@@ -296,9 +281,7 @@ private:
       look_at_start(news);
       keep([&] { recording_->packet(news); });
       break;
-    case Kind::clock:
-      keep([&] { recording_->writer().clock(news.device, news.estimate, news.jumps); });
-      break;
+    case Kind::clock: keep([&] { recording_->writer().clock(news.device, news.estimate, news.jumps); }); break;
     case Kind::gone:
     case Kind::back:
       model.set_state(news.kind == Kind::gone ? Model::State::gone : Model::State::live);
@@ -312,8 +295,7 @@ private:
       break;
     case Kind::ready:
     case Kind::mute:
-    case Kind::bytes:
-      break;
+    case Kind::bytes: break;
     }
   }
 
@@ -355,8 +337,7 @@ private:
     const GripRow row = row_of(news);
     grip_.take(row);
     keep([&] {
-      recording_->writer().comment(GRIP_ROW_KEY, static_cast<double>(news.host_us),
-                                   fixed(row.time_us, 1) + "," + grip_cells(row));
+      recording_->writer().comment(GRIP_ROW_KEY, static_cast<double>(news.host_us), fixed(row.time_us, 1) + "," + grip_cells(row));
     });
   }
 
@@ -385,8 +366,7 @@ private:
   void answer_interrupts() {
     if (interrupts() > reported_interrupts_) {
       reported_interrupts_ = interrupts();
-      message_.show(reported_interrupts_ == 1 ? "Ctrl-C: the width stays; again: opens slowly"
-                                              : "Ctrl-C: opens slowly; again: ends here");
+      message_.show(reported_interrupts_ == 1 ? "Ctrl-C: the width stays; again: opens slowly" : "Ctrl-C: opens slowly; again: ends here");
       view_->hurry();
       event("interrupted");
     }
@@ -396,8 +376,7 @@ private:
   bool should_end() {
     std::int64_t since_begin_us = steady_now_us() - zero_us_;
     if (!requested_ && since_begin_us > TARING_us) {
-      failure_ =
-          std::string(SIDES[has_zero_[0] ? 1 : 0]) + ": no zero yet; see that its sensors answer (fingertip info)";
+      failure_ = std::string(SIDES[has_zero_[0] ? 1 : 0]) + ": no zero yet; see that its sensors answer (fingertip info)";
     } else if (lost_fingers_ == FINGERS) {
       failure_ = "both fingertips are lost";
     }
@@ -406,8 +385,7 @@ private:
     inactive_since_us_ = is_inactive ? inactive_since_us_ : steady_now_us();
     bool never_active = steady_now_us() - inactive_since_us_ > INACTIVE_us;
     bool opened = state() == GRIP_OPEN && interrupts() > 1;
-    return !failure_.empty() || quit_ || end_requested() || interrupts() > 2 || opened ||
-           (!has_keys_ && (at_end || never_active)) ||
+    return !failure_.empty() || quit_ || end_requested() || interrupts() > 2 || opened || (!has_keys_ && (at_end || never_active)) ||
            (options_.seconds && static_cast<double>(since_begin_us) > 1e6 * *options_.seconds);
   }
 
@@ -445,15 +423,11 @@ private:
 
   int status_of_end() const {
     switch (state_at_end_) {
-    case GRIP_MISSED:
-      return GRASP_MISSED;
-    case GRIP_DROPPED:
-      return GRASP_DROPPED;
+    case GRIP_MISSED: return GRASP_MISSED;
+    case GRIP_DROPPED: return GRASP_DROPPED;
     case GRIP_FAULT:
-    case GRIP_ACTIVATING:
-      return GRASP_FAULT;
-    default:
-      return silent_at_end_ ? GRASP_FAULT : GRASP_DONE;
+    case GRIP_ACTIVATING: return GRASP_FAULT;
+    default: return silent_at_end_ ? GRASP_FAULT : GRASP_DONE;
     }
   }
 
@@ -466,9 +440,8 @@ private:
       return fault_;
     }
     if (state_at_end_ == GRIP_ACTIVATING) {
-      return last_->command.motion == GRIP_ACTIVATE
-                 ? "the gripper does not become active"
-                 : "the gripper is not active, and what it holds would fall if it were activated";
+      return last_->command.motion == GRIP_ACTIVATE ? "the gripper does not become active"
+                                                    : "the gripper is not active, and what it holds would fall if it were activated";
     }
     return "the gripper does not answer" + (trouble_.empty() ? "" : ": " + trouble_);
   }
@@ -481,9 +454,8 @@ private:
       recording_->finish(statistics, "ended");
     });
     if (recording_) {
-      std::fprintf(stderr, "%s: %llu frames of 2 fingertips, aligned to %s us or better\n",
-                   printable(options_.recording).c_str(), static_cast<unsigned long long>(frames),
-                   fixed(recording_->writer().alignment_us(), 0).c_str());
+      std::fprintf(stderr, "%s: %llu frames of 2 fingertips, aligned to %s us or better\n", printable(options_.recording).c_str(),
+                   static_cast<unsigned long long>(frames), fixed(recording_->writer().alignment_us(), 0).c_str());
     }
     const std::string cause = cause_of_fault();
     for (const std::string &text : {cause.empty() ? trouble_ : cause, lost_}) {
@@ -492,8 +464,8 @@ private:
       }
     }
     std::string width = last_ && last_->status ? fixed(last_->status->width_mm, 1) + " mm" : "?";
-    std::fprintf(stderr, "%s; the gripper keeps its position, %s (`fingertip gripper open` opens it)\n",
-                 state_text(state_at_end_).c_str(), width.c_str());
+    std::fprintf(stderr, "%s; the gripper keeps its position, %s (`fingertip gripper open` opens it)\n", state_text(state_at_end_).c_str(),
+                 width.c_str());
     loop_.rethrow();
     if (!failure_.empty()) {
       throw Error(failure_);
@@ -550,9 +522,8 @@ std::string default_of(const GraspSetting &setting, const GripSettings &usual, c
 
 /* What breaks: a preset by name, or the force that breaks it. Options of single limits override it. */
 void with_presets(CLI::App *command, std::map<std::string, double> &breaking) {
-  const std::string names = joined(grasp_presets(), ", ", [](const GraspPreset &preset) {
-    return std::string(preset.name) + " (" + plain(preset.breaks_N) + " N)";
-  });
+  const std::string names = joined(
+      grasp_presets(), ", ", [](const GraspPreset &preset) { return std::string(preset.name) + " (" + plain(preset.breaks_N) + " N)"; });
   auto *preset = command->add_option_function<std::string>(
       "--preset", [&breaking](const std::string &name) { breaking = typed([&] { return preset_values(name); }); },
       "Cap, start, floor and approach for what breaks: " + names);
@@ -584,15 +555,13 @@ void with_limits(CLI::App *command, std::map<std::string, double> &limits) {
 
 void add_grasp(CommandLine &line) {
   auto options = std::make_shared<GraspOptions>();
-  CLI::App *command =
-      line.add("grasp", "Hold an object between two fingertips on a gripper", [options] { return run(*options); });
+  CLI::App *command = line.add("grasp", "Hold an object between two fingertips on a gripper", [options] { return run(*options); });
   with_value(command, "MODEL", "--gripper", options->gripper.model, gripper_model_names())->required();
   with_value(command, "PATH", "--gripper-port", options->gripper.port,
              "Its serial line; default: the only one on USB that is no fingertip");
   with_value(command, "SERIAL|PORT", "--left", options->left, "Fingertip; default: the first of two");
   with_value(command, "SERIAL|PORT", "--right", options->right, "Fingertip; default: the other");
-  command->add_flag("--activate", options->activate,
-                    "Activate a gripper that is not: it moves, and drops what it holds");
+  command->add_flag("--activate", options->activate, "Activate a gripper that is not: it moves, and drops what it holds");
   with_seconds(command, options->seconds, "End after this long, the gripper holding");
   with_value(command, "FILE.csv|FILE.mcap", "-o,--record", options->recording, "Record all of it");
   command->add_flag("--overwrite", options->overwrite, "Replace the recording if it exists");
@@ -602,11 +571,10 @@ void add_grasp(CommandLine &line) {
   with_gripper_line(command, options->gripper);
   with_presets(command, options->breaking);
   with_limits(command, options->limits);
-  command->footer(
-      "Keys, on a terminal: q end, holding; o open; h hold; g grasp; p place; r hand over.\n\nExit status:\n  0  as "
-      "asked, the gripper "
-      "holding or open\n  1  an error, which is named\n  2  wrong usage\n  3  it closed, and nothing was there\n  4  "
-      "the object fell\n  5  the gripper failed, was not active, or did not answer at the end");
+  command->footer("Keys, on a terminal: q end, holding; o open; h hold; g grasp; p place; r hand over.\n\nExit status:\n  0  as "
+                  "asked, the gripper "
+                  "holding or open\n  1  an error, which is named\n  2  wrong usage\n  3  it closed, and nothing was there\n  4  "
+                  "the object fell\n  5  the gripper failed, was not active, or did not answer at the end");
 }
 
 } // namespace fingertip

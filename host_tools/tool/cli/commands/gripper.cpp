@@ -64,17 +64,15 @@ void advise_about_timer(const std::string &path) {
 int list_grippers() {
   std::printf("model\tstroke_mm\tstep_mm\tspeed_mm_s\tforce_N\n");
   for (const GripperTraits &traits : gripper_models()) {
-    std::printf("%s\t%s\t%s\t%s-%s\t%s-%s\n", traits.model.c_str(), fixed(traits.stroke_mm, 0).c_str(),
-                fixed(traits.step_mm, 3).c_str(), fixed(traits.speed_min_mm_s, 0).c_str(),
-                fixed(traits.speed_max_mm_s, 0).c_str(), fixed(traits.force_min_N, 0).c_str(),
+    std::printf("%s\t%s\t%s\t%s-%s\t%s-%s\n", traits.model.c_str(), fixed(traits.stroke_mm, 0).c_str(), fixed(traits.step_mm, 3).c_str(),
+                fixed(traits.speed_min_mm_s, 0).c_str(), fixed(traits.speed_max_mm_s, 0).c_str(), fixed(traits.force_min_N, 0).c_str(),
                 fixed(traits.force_max_N, 0).c_str());
   }
   const std::vector<GripperPort> ports = find_gripper_ports();
-  std::printf(ports.empty() ? "\nno serial port on USB that may be a gripper's\n"
-                            : "\nports that may be a gripper's:\n");
+  std::printf(ports.empty() ? "\nno serial port on USB that may be a gripper's\n" : "\nports that may be a gripper's:\n");
   for (const GripperPort &port : ports) {
-    std::printf("%s\t%s\t%s\n", printable(port.path).c_str(),
-                port.adapter.empty() ? "-" : printable(port.adapter).c_str(), timer_text(port).c_str());
+    std::printf("%s\t%s\t%s\n", printable(port.path).c_str(), port.adapter.empty() ? "-" : printable(port.adapter).c_str(),
+                timer_text(port).c_str());
   }
   for (const GripperPort &port : ports) {
     advise_about_timer(port.path);
@@ -101,8 +99,7 @@ std::string fault_of(const Gripper &gripper, const GripperStatus &status) {
 }
 
 // Until it is done; what lasts too long, or faults, ends in an Error.
-GripperStatus wait_for_end(Gripper &gripper, const char *what, double longest_s,
-                           const std::function<bool(const GripperStatus &)> &done,
+GripperStatus wait_for_end(Gripper &gripper, const char *what, double longest_s, const std::function<bool(const GripperStatus &)> &done,
                            const std::function<double(const GripperStatus &)> &share) {
   ProgressBar bar(what, ProgressBar::Lines::none);
   const auto end = host_now() + std::chrono::milliseconds(static_cast<long>(longest_s * 1000));
@@ -131,9 +128,7 @@ void activate(Gripper &gripper) {
   const auto begin = host_now();
   const GripperStatus status = wait_for_end(
       gripper, "activating", ACTIVATION_MOST_s, [](const GripperStatus &now) { return now.active; },
-      [&](const GripperStatus &) {
-        return std::chrono::duration<double>(host_now() - begin).count() / ACTIVATION_MOST_s;
-      });
+      [&](const GripperStatus &) { return std::chrono::duration<double>(host_now() - begin).count() / ACTIVATION_MOST_s; });
   std::printf("activated at %s\n", mm(status.width_mm).c_str());
 }
 
@@ -155,8 +150,7 @@ int info(Gripper &gripper, const std::string &port) {
 
 void check_range(const char *name, double value, double least, double most, const char *unit) {
   if (!(value >= least && value <= most)) {
-    throw WrongUsage(std::string(name) + " goes from " + fixed(least, 0) + " to " + fixed(most, 0) + " " + unit +
-                     " with this gripper");
+    throw WrongUsage(std::string(name) + " goes from " + fixed(least, 0) + " to " + fixed(most, 0) + " " + unit + " with this gripper");
   }
 }
 
@@ -165,11 +159,8 @@ constexpr double SLACK_mm = 1.0, END_SLACK_mm = 5.0;
 
 int move(Gripper &gripper, const GripperOptions &options) {
   const GripperTraits &traits = gripper.traits();
-  const double width_mm = options.action == "open"    ? traits.stroke_mm
-                          : options.action == "close" ? 0.0
-                                                      : *options.width_mm;
-  const double speed_mm_s =
-      options.speed_mm_s.value_or(std::clamp(SPEED_mm_s, traits.speed_min_mm_s, traits.speed_max_mm_s));
+  const double width_mm = options.action == "open" ? traits.stroke_mm : options.action == "close" ? 0.0 : *options.width_mm;
+  const double speed_mm_s = options.speed_mm_s.value_or(std::clamp(SPEED_mm_s, traits.speed_min_mm_s, traits.speed_max_mm_s));
   check_range("WIDTH", width_mm, 0.0, traits.stroke_mm, "mm");
   check_range("--speed", speed_mm_s, traits.speed_min_mm_s, traits.speed_max_mm_s, "mm/s");
   if (options.force_N != 0) {
@@ -197,8 +188,7 @@ int move(Gripper &gripper, const GripperOptions &options) {
     std::printf("holds an object at %s, asked for %s\n", mm(end.width_mm).c_str(), mm(width_mm).c_str());
   } else if (const bool at_end = width_mm <= 0.0 || width_mm >= traits.stroke_mm;
              std::abs(end.width_mm - width_mm) > (at_end ? END_SLACK_mm : SLACK_mm) + traits.deadband_mm) {
-    throw Error("the gripper stopped at " + mm(end.width_mm) + ", not at " + mm(width_mm) +
-                ", and reports neither an object nor a fault");
+    throw Error("the gripper stopped at " + mm(end.width_mm) + ", not at " + mm(width_mm) + ", and reports neither an object nor a fault");
   } else {
     std::printf("at %s, without an object\n", mm(end.width_mm).c_str());
   }
@@ -248,15 +238,12 @@ void add_gripper(CommandLine &line) {
   with_value(command, "ACTION", "ACTION", options->action, "list, info, move WIDTH, open or close")->required();
   with_value(command, "MM", "WIDTH", options->width_mm, "For move: width between the pads, in mm");
   with_value(command, "MODEL", "--model", options->way.model, "Model of the gripper: " + gripper_model_names());
-  with_value(command, "PATH", "--port", options->way.port,
-             "Its serial line; default: the only one on USB that is no fingertip");
-  with_value(command, "MM/S", "--speed", options->speed_mm_s,
-             "Speed of the width; default: 50 mm/s, or the nearest that it can");
+  with_value(command, "PATH", "--port", options->way.port, "Its serial line; default: the only one on USB that is no fingertip");
+  with_value(command, "MM/S", "--speed", options->speed_mm_s, "Speed of the width; default: 50 mm/s, or the nearest that it can");
   with_value(command, "N", "--force", options->force_N,
              "Force at which it stops, by its maker's scale, which is not newtons; default: its least");
-  command->add_flag(
-      "--activate", options->activate,
-      "Activate it first, which clears its faults; a Robotiq opens and closes fully, and whatever it holds falls");
+  command->add_flag("--activate", options->activate,
+                    "Activate it first, which clears its faults; a Robotiq opens and closes fully, and whatever it holds falls");
   with_gripper_line(command, options->way);
 }
 

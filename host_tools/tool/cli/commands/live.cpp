@@ -48,8 +48,8 @@ struct LiveOptions {
 class Live {
 public:
   Live(const LiveOptions &options, const std::vector<Way> &ways)
-      : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()), taring_(ways.size()),
-        accepted_(ways.size()), reported_missing_(ways.size()) {
+      : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()), taring_(ways.size()), accepted_(ways.size()),
+        reported_missing_(ways.size()) {
     DeviceLoop::Options wanted;
     wanted.streams = WIRE_STREAM_ALL;
     wanted.follow_clock = several();
@@ -63,9 +63,7 @@ public:
     if (!options.recording.empty() && !to_standard_output_) {
       note_ = "recording to " + printable(options.recording);
     }
-    view_ = options.monitor       ? make_monitor_view(options.colour)
-            : to_standard_output_ ? make_state_view()
-                                  : make_progress_view();
+    view_ = options.monitor ? make_monitor_view(options.colour) : to_standard_output_ ? make_state_view() : make_progress_view();
   }
 
   int run() {
@@ -103,8 +101,7 @@ private:
   bool several() const { return models_.size() > 1; }
 
   void take_news() {
-    /* Asked first: what was read until then is in the feed. A row waits for those of a fingertip
-     * whose thread got no time to read them. */
+    /* Asked first: what was read until then is in the feed. A row waits for those of a fingertip whose thread got no time to read them. */
     double settled_us = static_cast<double>(steady_now_us());
     for (const auto &loop : loops_) {
       settled_us = std::min(settled_us, loop->read_until_us());
@@ -148,9 +145,7 @@ private:
       any_gone_ = true;
       event(news.device, EVENT_GONE);
       break;
-    case Kind::mute:
-      event(news.device, "no answer to the end of the streams");
-      break;
+    case Kind::mute: event(news.device, "no answer to the end of the streams"); break;
     case Kind::bytes:
       if (!raw_bytes_) {
         raw_bytes_ = std::make_unique<OutputFile>(options_.raw_bytes, options_.overwrite, OutputFile::Appears::at_once);
@@ -211,9 +206,7 @@ private:
     }
   }
 
-  double seconds() const {
-    return several() ? static_cast<double>(steady_now_us() - zero_us_) / 1e6 : models_[0].seconds();
-  }
+  double seconds() const { return several() ? static_cast<double>(steady_now_us() - zero_us_) / 1e6 : models_[0].seconds(); }
 
   /* "" to go on. */
   std::string reason_to_end() const {
@@ -261,8 +254,8 @@ private:
       }
     } else if (key == 'q') {
       quit_ = true;
-    } else if (key == 't' && std::all_of(models_.begin(), models_.end(),
-                                         [](const Model &model) { return model.state() == Model::State::live; })) {
+    } else if (key == 't' &&
+               std::all_of(models_.begin(), models_.end(), [](const Model &model) { return model.state() == Model::State::live; })) {
       tare_.ask(now);
     }
   }
@@ -286,9 +279,8 @@ private:
 
   std::string refusal(std::size_t device, std::uint8_t result) const {
     const auto &contact = models_[device].contact();
-    return result == WIRE_RESULT_NOT_NOW && contact && (contact->flags & CONTACT_FLAG_CONTACT)
-               ? "it reports a contact, let go of the pad"
-               : result_text(result);
+    return result == WIRE_RESULT_NOT_NOW && contact && (contact->flags & CONTACT_FLAG_CONTACT) ? "it reports a contact, let go of the pad"
+                                                                                               : result_text(result);
   }
 
   bool is_refused() const { return message_.text().find("not tared: ") != std::string::npos; }
@@ -325,8 +317,7 @@ private:
       return;
     }
     reported_missing_[device] = missing;
-    std::fprintf(stderr, "%s%s: %s\n", isatty(STDERR_FILENO) ? "\r\x1b[K" : "",
-                 printable(loops_[device]->name()).c_str(),
+    std::fprintf(stderr, "%s%s: %s\n", isatty(STDERR_FILENO) ? "\r\x1b[K" : "", printable(loops_[device]->name()).c_str(),
                  missing ? ("sensors missing: " + sensors_text(missing) + "; see their wiring (fingertip info)").c_str()
                          : "all sensors answer");
   }
@@ -361,12 +352,10 @@ private:
     }
     const double edges_us = joint->edges_alignment_us();
     const std::string by_edges = edges_us > 0 ? ", by edges to " + fixed(edges_us, 1) + " us" : "";
-    std::fprintf(
-        stderr,
-        "%s%llu frames of %zu fingertips, aligned to %s us or better%s, %llu packets dropped, %llu CRC errors%s\n",
-        name.c_str(), static_cast<unsigned long long>(frames), models_.size(), fixed(joint->alignment_us(), 0).c_str(),
-        by_edges.c_str(), static_cast<unsigned long long>(sum.dropped_packets),
-        static_cast<unsigned long long>(sum.crc_errors), edges.c_str());
+    std::fprintf(stderr, "%s%llu frames of %zu fingertips, aligned to %s us or better%s, %llu packets dropped, %llu CRC errors%s\n",
+                 name.c_str(), static_cast<unsigned long long>(frames), models_.size(), fixed(joint->alignment_us(), 0).c_str(),
+                 by_edges.c_str(), static_cast<unsigned long long>(sum.dropped_packets), static_cast<unsigned long long>(sum.crc_errors),
+                 edges.c_str());
   }
 
   const LiveOptions &options_;
@@ -441,8 +430,7 @@ int run(const LiveOptions &options) {
   return Live(options, ways).run();
 }
 
-CLI::App *add(CommandLine &line, const std::string &name, const std::string &help,
-              const std::shared_ptr<LiveOptions> &options) {
+CLI::App *add(CommandLine &line, const std::string &name, const std::string &help, const std::shared_ptr<LiveOptions> &options) {
   CLI::App *command = line.add(name, help, [options] { return run(*options); });
   command->add_option("--device", options->devices, "Serial number of the fingertip; several are taken on one clock")
       ->take_all()
@@ -470,8 +458,7 @@ void add_record(CommandLine &line) {
   auto options = std::make_shared<LiveOptions>();
   options->monitor = false;
   add(line, "record", "Record every frame to a CSV or MCAP file, until Ctrl-C", options)
-      ->add_option("file", options->recording,
-                   "The recording to write, CSV or MCAP by its name; -: standard output, each row as it comes")
+      ->add_option("file", options->recording, "The recording to write, CSV or MCAP by its name; -: standard output, each row as it comes")
       ->required()
       ->type_name("FILE.csv|FILE.mcap|-");
 }

@@ -11,8 +11,8 @@ using Words = std::vector<std::string>;
 
 /* The tool links no simulation. */
 static int simulate(Words options) {
-  const auto program = find_installed(
-      {"../" FINGERTIP_LIBEXECDIR "/fingertip/fingertip-simulate", "../../simulation/cell/fingertip-simulate"});
+  const auto program =
+      find_installed({"../" FINGERTIP_LIBEXECDIR "/fingertip/fingertip-simulate", "../../simulation/cell/fingertip-simulate"});
   if (!program) {
     throw Error("the program that simulates is not installed; install all of the tool, or build the target fingertip "
                 "in the project's tree");
@@ -42,8 +42,7 @@ static void add_program(CommandLine &line, const std::string &name, const std::s
 }
 
 void add_simulate(CommandLine &line) {
-  add_program(line, "simulate", "Simulate fingertips, which every program finds as it finds real ones, until Ctrl-C",
-              simulate);
+  add_program(line, "simulate", "Simulate fingertips, which every program finds as it finds real ones, until Ctrl-C", simulate);
 }
 
 void add_fit(CommandLine &line) {
@@ -51,8 +50,7 @@ void add_fit(CommandLine &line) {
 }
 
 void add_validate(CommandLine &line) {
-  add_program(line, "validate", "Make a pad's report card in ten minutes, with one weight and a printed template",
-              validate);
+  add_program(line, "validate", "Make a pad's report card in ten minutes, with one weight and a printed template", validate);
 }
 
 } // namespace fingertip

@@ -60,8 +60,7 @@ public:
   void show(PacketFile &file) {
     show([&] {
       const auto place = file.place();
-      return place.in_recording ? place.in_recording->in_file
-                                : LineSource::Place{static_cast<std::streamoff>(place.state.offset)};
+      return place.in_recording ? place.in_recording->in_file : LineSource::Place{static_cast<std::streamoff>(place.state.offset)};
     });
   }
 
@@ -74,8 +73,7 @@ private:
 
 /* That a recording has a place for. */
 bool is_kept(const wire_packet &packet) {
-  return is_frame(packet) || packet.type == WIRE_HEALTH || packet.type == WIRE_INFO || packet.type == WIRE_ACK ||
-         packet.type == WIRE_SYNC;
+  return is_frame(packet) || packet.type == WIRE_HEALTH || packet.type == WIRE_INFO || packet.type == WIRE_ACK || packet.type == WIRE_SYNC;
 }
 
 void check_paths(const Conversion &conversion) {
@@ -124,8 +122,7 @@ Contents contents_of(const Conversion &conversion) {
 
 void report_cut_short(const std::string &path, bool is_cut_short) {
   if (is_cut_short) {
-    std::fprintf(stderr, "%s: no end line: the recording was cut short, its recorder killed or its disk full\n",
-                 printable(path).c_str());
+    std::fprintf(stderr, "%s: no end line: the recording was cut short, its recorder killed or its disk full\n", printable(path).c_str());
   }
 }
 
@@ -151,8 +148,8 @@ void convert_packets(const Conversion &conversion) {
   }
   RecordingWriter writer(make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished),
                          contents.info ? &*contents.info : nullptr,
-                         contents.sensor_count.value_or(contents.info ? contents.info->sensor_count : std::uint8_t{0}),
-                         metadata, contents.sensor_count.has_value());
+                         contents.sensor_count.value_or(contents.info ? contents.info->sensor_count : std::uint8_t{0}), metadata,
+                         contents.sensor_count.has_value());
   PacketFile file(conversion.from, conversion.salvage, conversion.device, conversion.interval);
   Progress progress(conversion.from);
   while (auto item = file.next()) {
@@ -166,8 +163,8 @@ void convert_packets(const Conversion &conversion) {
   writer.finish({file.statistics()}, "converted");
   report_losses(conversion.from, file);
   if (contents.left_out > 0) {
-    std::fprintf(stderr, "%s: %llu packets are of kinds that recordings leave out\n",
-                 printable(conversion.from).c_str(), static_cast<Count>(contents.left_out));
+    std::fprintf(stderr, "%s: %llu packets are of kinds that recordings leave out\n", printable(conversion.from).c_str(),
+                 static_cast<Count>(contents.left_out));
   }
   std::printf("%s: %llu frames, %s\n", printable(conversion.to).c_str(), static_cast<Count>(writer.frames()),
               file.statistics().text().c_str());
@@ -202,8 +199,7 @@ void convert_lines(const Conversion &conversion) {
       continue;
     }
     if (line.number > last + 1 + line.left_out) {
-      report_damage(std::to_string(line.number - last - 1 - line.left_out) + " lines are lost before line " +
-                    std::to_string(line.number));
+      report_damage(std::to_string(line.number - last - 1 - line.left_out) + " lines are lost before line " + std::to_string(line.number));
     }
     last = line.number;
     count++;
@@ -240,16 +236,14 @@ void convert_to_capture(const Conversion &conversion) {
   }
   capture.finish();
   report_losses(conversion.from, file);
-  std::printf("%s: %llu packets, without the recorder's own lines\n", printable(conversion.to).c_str(),
-              static_cast<Count>(packets));
+  std::printf("%s: %llu packets, without the recorder's own lines\n", printable(conversion.to).c_str(), static_cast<Count>(packets));
 }
 
 int convert(const Conversion &conversion) {
   const auto end = std::filesystem::path(conversion.to).extension();
   const bool to_capture = end == ".ftr";
   if (!to_capture && end != ".csv" && !is_mcap_name(conversion.to)) {
-    throw WrongUsage("\"" + printable(conversion.to) +
-                     "\" must end with .csv, .mcap or .ftr, which selects the format");
+    throw WrongUsage("\"" + printable(conversion.to) + "\" must end with .csv, .mcap or .ftr, which selects the format");
   }
   if (to_capture) {
     convert_to_capture(conversion);
@@ -302,8 +296,7 @@ double speed_from_text(const std::string &text) {
 int show(const ReplayOptions &options) {
   Playback playback(options.file, options.salvage, options.device, options.speed, options.interval);
   std::string name = printable(options.file);
-  std::unique_ptr<View> view =
-      playback.grip() ? make_grasp_view(options.colour, *playback.grip()) : make_monitor_view(options.colour);
+  std::unique_ptr<View> view = playback.grip() ? make_grasp_view(options.colour, *playback.grip()) : make_monitor_view(options.colour);
   while (!playback.is_over() && !stop_requested()) {
     playback.step(host_now());
     view->update(playback.models(), playback.caption(name));
@@ -322,8 +315,7 @@ int show(const ReplayOptions &options) {
     }
     report_losses(options.file, track.file());
     bool several = playback.tracks().size() > 1;
-    std::printf("%s: %s%s\n", name.c_str(),
-                several && model.info() ? (text_field(model.info()->serial) + ": ").c_str() : "",
+    std::printf("%s: %s%s\n", name.c_str(), several && model.info() ? (text_field(model.info()->serial) + ": ").c_str() : "",
                 summary_text(model).c_str());
   }
   return 0;
@@ -337,8 +329,7 @@ void add_replay(CommandLine &line) {
     if (options->to_csv.empty()) {
       return show(*options);
     }
-    convert_packets(
-        {options->file, options->to_csv, options->device, options->salvage, options->overwrite, options->interval});
+    convert_packets({options->file, options->to_csv, options->device, options->salvage, options->overwrite, options->interval});
     return 0;
   });
   with_value(command, "FILE", "file", options->file, "Recording (.csv, .mcap) or bytes of the line (.ftr)")->required();
@@ -358,13 +349,10 @@ void add_replay(CommandLine &line) {
 
 void add_convert(CommandLine &line) {
   auto options = std::make_shared<Conversion>();
-  CLI::App *command =
-      line.add("convert", "Turn a recording or a capture into another kind", [options] { return convert(*options); });
+  CLI::App *command = line.add("convert", "Turn a recording or a capture into another kind", [options] { return convert(*options); });
   with_value(command, "FILE", "from", options->from, "Recording (.csv, .mcap) or bytes of the line (.ftr)")->required();
-  with_value(command, "OUT.csv|OUT.mcap|OUT.ftr", "to", options->to, "File to write; its ending selects the format")
-      ->required();
-  with_value(command, "SERIAL", "--device", options->device,
-             "Serial number of one of several fingertips in the recording; only this one");
+  with_value(command, "OUT.csv|OUT.mcap|OUT.ftr", "to", options->to, "File to write; its ending selects the format")->required();
+  with_value(command, "SERIAL", "--device", options->device, "Serial number of one of several fingertips in the recording; only this one");
   command->add_flag("--salvage", options->salvage, "Read what is readable of a damaged file, and report the rest");
   command->add_flag("--overwrite", options->overwrite, "Replace OUT if it exists");
   with_time_span(command, options->interval);

@@ -63,8 +63,7 @@ template <typename WayOf> void serve_if_there(Server &server, Errors &errors, co
 /* Those that are there now, also plugged in later: all, or those that are named. Throws Error: none of them can be. */
 void look(Server &server, const ServeOptions &options, Errors &errors) {
   std::map<std::string, int> serials;
-  for (const Found &found :
-       options.devices.empty() && options.choice.port.empty() ? find_usb() : std::vector<Found>()) {
+  for (const Found &found : options.devices.empty() && options.choice.port.empty() ? find_usb() : std::vector<Found>()) {
     serve_if_there(server, errors, found.serial + "/" + std::to_string(serials[found.serial]), [&] {
       if (serials[found.serial]++) {
         throw Error(found.serial + ": another fingertip has this serial number, and one of them is shared");
@@ -73,9 +72,7 @@ void look(Server &server, const ServeOptions &options, Errors &errors) {
     });
   }
   for (const std::string &each : options.devices) {
-    serve_if_there(server, errors, each, [&] {
-      return std::optional(choose_way({options.choice.port, each, options.choice.reach}));
-    });
+    serve_if_there(server, errors, each, [&] { return std::optional(choose_way({options.choice.port, each, options.choice.reach})); });
   }
 }
 
@@ -113,11 +110,9 @@ int serve(const ServeOptions &options) {
 
 void add_serve(CommandLine &line) {
   auto options = std::make_shared<ServeOptions>();
-  CLI::App *command = line.add("serve", "Share fingertips with every program that uses them, until Ctrl-C",
-                               [options] { return serve(*options); });
-  command
-      ->add_option("--device", options->devices,
-                   "Serial number of a fingertip to share; default: all, also those plugged in later")
+  CLI::App *command =
+      line.add("serve", "Share fingertips with every program that uses them, until Ctrl-C", [options] { return serve(*options); });
+  command->add_option("--device", options->devices, "Serial number of a fingertip to share; default: all, also those plugged in later")
       ->take_all()
       ->expected(1)
       ->type_name("SERIAL");
@@ -127,8 +122,7 @@ void add_serve(CommandLine &line) {
           "--group", [options](const std::string &name) { options->group = group_of(name); },
           "Who may use them beside this user; default: this user's group")
       ->type_name("NAME");
-  command->add_flag("--common", options->common,
-                    "Share in /run/fingertip, where all users look, instead of in this user's folder");
+  command->add_flag("--common", options->common, "Share in /run/fingertip, where all users look, instead of in this user's folder");
 }
 
 } // namespace fingertip

@@ -35,8 +35,7 @@ bool opens(const std::string &url) {
   char *arguments[] = {words[0].data(), words[1].data(), words[2].data(), words[3].data(), words[4].data(), nullptr};
   pid_t shell = 0;
   int status = 1;
-  return posix_spawnp(&shell, "sh", nullptr, nullptr, arguments, environ) == 0 && waitpid(shell, &status, 0) == shell &&
-         status == 0;
+  return posix_spawnp(&shell, "sh", nullptr, nullptr, arguments, environ) == 0 && waitpid(shell, &status, 0) == shell && status == 0;
 }
 
 int web(const WebOptions &options) {
@@ -53,8 +52,7 @@ int web(const WebOptions &options) {
                  printable(options.address).c_str());
   }
   bool is_open = !options.no_browser && opens(server.url());
-  std::fprintf(stderr, "%s; Ctrl-C ends\n",
-               is_open ? "opening it in the browser" : "open it in Chromium, Chrome or Edge, from 89 on");
+  std::fprintf(stderr, "%s; Ctrl-C ends\n", is_open ? "opening it in the browser" : "open it in Chromium, Chrome or Edge, from 89 on");
   server.serve(stop_requested);
   return 0;
 }
@@ -63,13 +61,10 @@ int web(const WebOptions &options) {
 
 void add_web(CommandLine &line) {
   auto options = std::make_shared<WebOptions>();
-  CLI::App *command = line.add("web", "Serve the page that shows and operates fingertips in a browser, until Ctrl-C",
-                               [options] { return web(*options); });
-  command->add_option("--port", options->port, "TCP port; 0: any that is free; default 8109")
-      ->check(CLI::Range(0, 65535))
-      ->type_name("N");
-  with_value(command, "ADDRESS", "--address", options->address,
-             "Address to listen on; default 127.0.0.1: this machine only");
+  CLI::App *command =
+      line.add("web", "Serve the page that shows and operates fingertips in a browser, until Ctrl-C", [options] { return web(*options); });
+  command->add_option("--port", options->port, "TCP port; 0: any that is free; default 8109")->check(CLI::Range(0, 65535))->type_name("N");
+  with_value(command, "ADDRESS", "--address", options->address, "Address to listen on; default 127.0.0.1: this machine only");
   command->add_flag("--no-browser", options->no_browser, "Only print the address, do not open it");
 }
 

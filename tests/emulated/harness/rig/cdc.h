@@ -17,21 +17,19 @@
 #define POWER 0xc
 #endif
 #ifndef ARM
-#define ARM(control, value)                                                                                            \
-  do {                                                                                                                 \
-    (control) = (value);                                                                                               \
-    __asm volatile("nop\n nop\n nop\n nop\n nop\n nop");                                                               \
-    (control) = (value) | 1 << 10;                                                                                     \
+#define ARM(control, value)                                                                                                                \
+  do {                                                                                                                                     \
+    (control) = (value);                                                                                                                   \
+    __asm volatile("nop\n nop\n nop\n nop\n nop\n nop");                                                                                   \
+    (control) = (value) | 1 << 10;                                                                                                         \
   } while (0)
 #endif
 
 static const uint8_t device_descriptor[18] = {18, 1, 0, 2, 2, 2, 0, 64, 0x34, 0x12, 0x78, 0x56, 0, 1, 1, 2, 3, 1};
-static const uint8_t configuration[] = {9, 2, 67,   0, 2,    1,    0,  0x80, 50, 9,  4, 0,    0,    1,  2, 2,  1,
-                                        0, 5, 0x24, 0, 0x10, 1,    5,  0x24, 1,  0,  1, 4,    0x24, 2,  2, 5,  0x24,
-                                        6, 0, 1,    7, 5,    0x81, 3,  8,    0,  16, 9, 4,    1,    0,  2, 10, 0,
-                                        0, 0, 7,    5, 0x82, 2,    64, 0,    0,  7,  5, 0x02, 2,    64, 0, 0};
-static const uint8_t strings[4][6] = {
-    {4, 3, 9, 4}, {6, 3, 'M', 0, 'f', 0}, {6, 3, 'P', 0, 'r', 0}, {6, 3, 'S', 0, '1', 0}};
+static const uint8_t configuration[] = {9, 2,    67, 0,  2, 1, 0,    0x80, 50, 9,    4,    0,  0, 1, 2, 2, 1,    0, 5,  0x24, 0,  0x10, 1,
+                                        5, 0x24, 1,  0,  1, 4, 0x24, 2,    2,  5,    0x24, 6,  0, 1, 7, 5, 0x81, 3, 8,  0,    16, 9,    4,
+                                        1, 0,    2,  10, 0, 0, 0,    7,    5,  0x82, 2,    64, 0, 0, 7, 5, 0x02, 2, 64, 0,    0};
+static const uint8_t strings[4][6] = {{4, 3, 9, 4}, {6, 3, 'M', 0, 'f', 0}, {6, 3, 'P', 0, 'r', 0}, {6, 3, 'S', 0, '1', 0}};
 
 static uint32_t pid_in0, pid_in2, pid_out2, new_address, configured, dtr, sent, baud;
 
