@@ -11,7 +11,6 @@ import tempfile
 import unittest
 from unittest import mock
 
-
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "host_tools/report" / part) for part in ("shared", "measure", "shear", "../python", "../../tests/support")]
 import motion  # noqa: E402
@@ -23,7 +22,6 @@ from figures import assert_within  # noqa: E402
 
 BUILD = sys.argv.pop()
 CONTACTS = Contacts(BUILD)
-
 
 SHEAR = ROOT / "host_tools/report/shear/shear.py"
 
@@ -101,8 +99,7 @@ class ShearStatic(unittest.TestCase):
         ):
             fits = []
             for share in (0.0, 0.3):
-                case = touches.Case(pads, (thing,), share)
-                touch = touches.draw(CONTACTS, case, CONTACTS.random(3, 1, count))
+                touch = touches.draw(CONTACTS, touches.Case(pads, (thing,), share), CONTACTS.random(3, 1, count))
                 readings_Pa = CONTACTS.base_Pa(12.0, (thing,), 0 * count, touch, pads)[:, None]
                 fits.append(
                     CONTACTS.tangential(CONTACTS.own_array, CONTACTS.pad_profile(12.0), CONTACTS.settings_of(pads, 1.0), q10(readings_Pa))[

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Looks for mistakes in firmware/ and boards/ without running them.
 
-usage: analyse.py [--build DIR] [--all] [FILE...]
+usage: analyse.py [--build DIR] [--all] [--json FILE] [FILE...]
 
 clang-tidy (.clang-tidy says what for), cppcheck, gcc's -fanalyzer, and the mandatory rules of MISRA C:2012. --all: besides, clang's
 analyser of paths and cppcheck's reading of those rules, which take two minutes; the report does. One line for each finding; exit 1
@@ -171,10 +171,13 @@ def main(argv):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build", metavar="DIR", help="with host and the boards in it")
     parser.add_argument("--all", action="store_true", help="the slow ones too")
+    parser.add_argument("--json", type=pathlib.Path, metavar="FILE", help="how many were found")
     parser.add_argument("files", nargs="*", metavar="FILE", help="default: all")
     options = parser.parse_args(argv)
     told, count = findings(options.build.resolve(), options.files, options.all)
     print("\n".join(told) if told else f"{count} files, no finding")
+    if options.json:
+        options.json.write_text(json.dumps({"analyzer_findings": len(told), "analyzed_files": count}) + "\n", encoding="utf-8")
     return 1 if told else 0
 
 

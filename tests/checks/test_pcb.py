@@ -16,6 +16,7 @@ sys.path.insert(0, str(ROOT / "boards/drawing"))
 sys.path.insert(0, str(ROOT / "tests/support"))
 import called  # noqa: E402
 import draw  # noqa: E402
+import figures as figures_file  # noqa: E402
 import geometry  # noqa: E402
 import pcb_check  # noqa: E402
 
@@ -172,11 +173,23 @@ class Copper(unittest.TestCase):
         for run in ("one", "two"):
             called.run("/usr/bin/python3", ROOT / "boards/drawing/fabricate.py", folder / run)
         sensors, boards = geometry.places(), {bus: pcb_check.Board(text) for bus, text in TEXTS.items()}
+        errors = errors_of_boards()
         off = [off_um(folder / "one" / path.parent.name, boards[bus], sensors) for bus, path in FOLDERS.items()]
+        figures = {key: sum(board[key] for board in right) for key in right[0]} | {
+            "boards": len(FOLDERS),
+            "netlist_errors": len(errors),
+            "vias_under_sensors": sum(line.startswith("a via under") for line in errors),
+            "pad_places_off_um": max(off),
+            "rise_ns": {net: round(ns) for net, ns in pcb_check.rises_ns(BOARDS["parallel"], boards["parallel"]).items()},
+            "planted": len(found),
+            "planted_missed": sum(not errors for errors in found.values()),
+            "bytes_differ": len(differing(folder / "one", folder / "two")) + len(laid_otherwise()),
+        }
+        figures_file.add(ROOT / "build/report/board.json", figures)
         self.assertEqual([name for name, errors in found.items() if not errors], [])
-        self.assertGreaterEqual((len(FOLDERS), len(found)), (2, 24))
-        self.assertEqual(right, [dict.fromkeys(board, 0) for board in right])
-        self.assertEqual((max(off), len(differing(folder / "one", folder / "two"))), (0, 0))
+        nothing = {name: value for name, value in figures.items() if name not in ("boards", "planted", "rise_ns")}
+        self.assertEqual(nothing, dict.fromkeys(nothing, 0), errors)
+        self.assertGreaterEqual((figures["boards"], figures["planted"]), (2, 24))
 
 
 if __name__ == "__main__":

@@ -2,14 +2,16 @@
  * The sync pin of the release images: edges from outside are stamped to a microsecond, whatever the firmware is at and however
  * fast they come, and pulses come when they shall.
  *
- * usage: test_sync.mjs BUILD_OF_IMAGES FINGERTIP COMMAND_FRAME
+ * usage: test_sync.mjs BUILD_OF_IMAGES FINGERTIP COMMAND_FRAME REPORT.json
  */
 import assert from 'node:assert/strict';
-import { test } from 'node:test';
+import { mkdirSync, writeFileSync } from 'node:fs';
+import { dirname } from 'node:path';
+import { after, test } from 'node:test';
 import { Prng } from '../../host_tools/simulation/emulator/prng.mjs';
 import { ImageBench } from './harness/image_bench.mjs';
 
-const [images, fingertip, command_frame] = process.argv.slice(2);
+const [images, fingertip, command_frame, report] = process.argv.slice(2);
 const BOARDS = ['pico_mux', 'pico_parallel'];
 const LIMIT_us = 1;
 const GLITCH_ns = 340;
@@ -23,6 +25,17 @@ const RESETS_BUS = {
 };
 /** The wire is quiet so long. */
 const QUIET_ms = 300;
+const measured = {};
+
+/** The greatest of what was found so far. */
+const note = (name, value) => {
+  measured[name] = Math.max(measured[name] ?? 0, value);
+};
+
+after(() => {
+  mkdirSync(dirname(report), { recursive: true });
+  writeFileSync(report, `${JSON.stringify(measured, null, 1)}\n`);
+});
 
 /** A bench whose sync pin is driven by `next`; changes: all of the pin, with their times. */
 class Bench extends ImageBench {
@@ -91,6 +104,7 @@ for (const name of BOARDS) {
     );
     const worst_us = bench.judge(edges);
     t.diagnostic(`${edges.length} edges, the worst off by ${worst_us.toFixed(3)} us`);
+    note('sync_error_us_max', worst_us);
     assert.ok(worst_us <= LIMIT_us, `off by ${worst_us} us`);
     bench.end();
   });
@@ -114,9 +128,11 @@ for (const name of BOARDS) {
     t.diagnostic(
       `${edges.length} edges of ${bench.changes.length} sent, the worst off by ${worst_us.toFixed(3)} us; ${(100 * share).toFixed(1)} % of the frames`,
     );
+    note('sync_storm_frames_lost_max', 1 - share);
     assert.ok(share > 0.93, `${share} of the frames`);
     assert.ok(edges.length <= PER_ms * (storm_ms + quiet_ms) && edges.length > storm_ms, `${edges.length} edges`);
     assert.ok(late.length >= 8 && late.every(({ number }, i) => number === edges_of_storm + 1 + i), 'after the storm every edge counts');
+    note('sync_error_us_max', worst_us);
     assert.ok(worst_us <= LIMIT_us, `off by ${worst_us} us`);
     bench.end();
   });
@@ -153,10 +169,12 @@ for (const name of BOARDS) {
     const edges = bench.edges();
     const worst_us = bench.judge(edges);
     assert.ok(worst_us <= LIMIT_us, `off by ${worst_us} us`);
+    note('sync_error_us_max', worst_us);
     assert.equal(edges.length, bench.changes.length);
     const rises = edges.filter(({ high }) => high);
     const late_us = Math.max(...bench.changes.filter(({ high }) => high).map(({ t_ns }) => bench.device_us(t_ns) % 1e6));
     t.diagnostic(`rises up to ${late_us.toFixed(1)} us late`);
+    note('sync_second_late_us_max', late_us);
     assert.ok(rises.length >= 2 && late_us <= 20, `${rises.length} rises, ${late_us} us late`);
     edges.filter(({ high }) => !high).forEach(({ t_us }, i) => assert.ok(Math.abs(t_us - rises[i].t_us - 100e3) <= 20));
     bench.end();
@@ -180,6 +198,7 @@ for (const name of BOARDS) {
       matched += 1;
     }
     t.diagnostic(`${matched} pulses, their middle up to ${off_us.toFixed(1)} us from the frame's time`);
+    note('sync_frame_off_us_max', off_us);
     assert.ok(matched > 50 && off_us <= 100, `${matched} pulses, ${off_us} us`);
     bench.end();
   });
@@ -192,6 +211,7 @@ for (const name of BOARDS) {
     const edges = bench.edges();
     assert.ok(edges.length >= 0.9 * bench.changes.length, `${edges.length} of ${bench.changes.length}`);
     const worst_us = bench.judge(edges);
+    note('sync_error_us_max', worst_us);
     assert.ok(worst_us <= LIMIT_us, `off by ${worst_us} us`);
     const { host, client } = bench.machine;
     host.suspend();

@@ -1,6 +1,6 @@
 """Two emulated fingertips on one wire, their clocks 50 ppm apart, recorded into one file by the host tool; on simulated time.
 
-usage: test_sync_wire.py --image F.bin --support FOLDER --node NODE
+usage: test_sync_wire.py --image F.bin --support FOLDER --node NODE --report FILE.json
 
 A strobe drives both sync pins. Each emulator says when, on the tool's clock, it was powered on, and so when every frame truly was: the
 error between rows of both is that of the alignment by edges, which begins some seconds after the recording, and before that the one over USB.
@@ -25,6 +25,7 @@ RECORDED_s = 16
 BY_USB_s = 6.5  # the first edges, and five seconds more
 STROBE_ms = 251.3337
 LIMIT_us, USB_LIMIT_us = 2, 200
+MEASURED = {}
 
 
 class Emulator:
@@ -87,6 +88,12 @@ class OneWire(unittest.TestCase):
                 each.stop()
         cls.recordings = recordings_in(cls.file)
 
+    @classmethod
+    def tearDownClass(cls):
+        path = pathlib.Path(TOOLS.report)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(MEASURED, indent=1) + "\n", encoding="utf-8")
+
     def test_nothing_was_amiss(self):
         for each, recording, said in zip(self.emulators, self.recordings, self.said):
             self.assertIn(" sync=in", said)
@@ -116,6 +123,9 @@ class OneWire(unittest.TestCase):
         by_edges_us = worst_us(self.emulators, self.recordings, from_s=BY_USB_s)
         bound_us = float(self.recordings[0].end["edges_alignment_us"])
         print(f"over USB {by_usb_us:.1f} us, by edges {by_edges_us:.2f} us, stated bound {bound_us:.1f} us")
+        MEASURED.update(
+            sync_alignment_us=round(by_edges_us, 2), sync_alignment_bound_us=bound_us, sync_alignment_usb_us=round(by_usb_us, 1)
+        )
         self.assertLessEqual(by_edges_us, LIMIT_us)
         self.assertLessEqual(by_edges_us, bound_us)
         self.assertLessEqual(bound_us, 4)
@@ -130,4 +140,4 @@ class OneWire(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    main(TOOLS, "image", "node", "support")
+    main(TOOLS, "image", "node", "report", "support")

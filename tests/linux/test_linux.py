@@ -1,6 +1,6 @@
 """The emulated device judged by a stock Debian kernel, and the host tool, out of its Debian package, run on that kernel.
 
-usage: test_linux.py --image F.bin --parallel F.bin --cpack CPACK --build FOLDER --node NODE --cache FOLDER
+usage: test_linux.py --image F.bin --parallel F.bin --cpack CPACK --build FOLDER --node NODE --cache FOLDER --report usb.json
 
 The tests are one story and run in order: a first boot of the device streams over the serial port and ends with the boot loader request, a
 second one over libusb and ends with a 1200-baud touch, the third is of the other board, and another fingertip is plugged in beside it. What
@@ -21,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -29,9 +30,13 @@ sys.path.insert(0, str(HERE))
 sys.path[:0] = [str(ROOT / folder) for folder in ("host_tools/python", "tests/support", "tests/emulated")]
 from emulation import MAIN, options, write_scenario  # noqa: E402
 from fingertip import files, wire  # noqa: E402
+import figures  # noqa: E402
 import guest as virtual  # noqa: E402
 
 TOOLS = argparse.Namespace()
+REPORT = {}
+REPORTED = """packets_serial packets_libusb packets_pico_parallel lost stalled_shown_s kernel_warnings controller_warnings
+    machine_warnings detach_cycles linux_test_s""".split()
 SERIAL = "E660583883265A2C"
 OTHER_SERIAL = "E660583883265A2D"
 VENDOR_PRODUCT = "1209:0001"
@@ -333,6 +338,8 @@ class Linux(unittest.TestCase):
 
     def test_11_equal_sequences_and_none_lost(self):
         received = {transport: packets_of(stream)[0] for transport, stream in self.streams.items()}
+        REPORT.update(packets_serial=len(received["serial"]), packets_libusb=len(received["usb"]))
+        REPORT["lost"] = sum(map(gaps, received.values()))
         for packets in received.values():
             kinds = (wire.Contact, wire.Raw)
             frames = [(type(packet.body), packet.body.frame) for packet in packets if isinstance(packet.body, kinds)]
@@ -374,12 +381,15 @@ class Linux(unittest.TestCase):
         return stalled_s - silent_s, stalled_s - sounding_s, late_s
 
     def test_11_standing_still_shows_within_a_second(self):
+        shown_s = []
         for transport in ("serial", "usb"):
             least_s, most_s, late_s = self.stall(transport)
             print(f"{transport}: {least_s:.2f} to {most_s:.2f} s, another program waited {late_s:.2f} s")
             self.assertGreater(most_s, 0)
             self.assertLess(least_s - late_s, STALL_LIMIT_s)
+            shown_s.append(max(0, least_s - late_s))
         self.wait_for_port()
+        REPORT["stalled_shown_s"] = round(max(shown_s), 2)
 
     def start_recording(self, name, transport):
         self.sh(
@@ -423,6 +433,7 @@ class Linux(unittest.TestCase):
             self.wait_for_growth(name)
         events, _ = self.end_recording(name)
         self.assertEqual((events.count("gone"), events.count("back")), (count, count), events)
+        REPORT["detach_cycles"] = REPORT.get("detach_cycles", 0) + count
 
     def test_13_detached_in_mid_stream_serial(self):
         self.cycles("serial", SERIAL_CYCLES)
@@ -482,9 +493,11 @@ class Linux(unittest.TestCase):
         self.power_up("third", TOOLS.parallel, "pico_parallel")
         self.wait_for_port()
         self.assertRegex(self.tool("list"), rf"^{SERIAL}\tpico_parallel\t\d+\.\d+\.\d+\tserial /dev/ttyACM0, usb \d+/\d+\n$")
+        count = 0
         for transport in ("serial", "usb"):
-            self.stream(transport, PARALLEL_STREAM_s, 2 * 400 * PARALLEL_STREAM_s)
+            count += len(self.stream(transport, PARALLEL_STREAM_s, 2 * 400 * PARALLEL_STREAM_s))
             self.wait_for_port()
+        REPORT["packets_pico_parallel"] = count
 
     def test_19_two_told_apart(self):
         other = Emulator(self.folder, "other", TOOLS.image, "pico_mux", self.scenario, self.sockets[1], OTHER_SERIAL)
@@ -527,6 +540,7 @@ class Linux(unittest.TestCase):
             [each for each in self.complaints if pattern.match(each[1])] for pattern in (CONTROLLER_WARNING, MACHINE_WARNING)
         )
         complaints = [each for each in self.complaints if each not in controller + machine]
+        REPORT.update(kernel_warnings=len(complaints), controller_warnings=len(controller), machine_warnings=len(machine))
         for before, text in controller + machine:
             print(f"before {before}: {text}")
         self.assertEqual(complaints, [])
@@ -534,9 +548,17 @@ class Linux(unittest.TestCase):
         self.assertEqual([line for line in self.guest.stop() if reconnecting not in line], [])
 
 
+class Report(unittest.TextTestRunner):
+    def run(self, test):
+        began_s = time.monotonic()
+        result = super().run(test)
+        REPORT["linux_test_s"] = round(time.monotonic() - began_s, 1)
+        return result
+
+
 def main():
     parser = argparse.ArgumentParser()
-    for name in ("image", "parallel", "cpack", "build", "node", "cache"):
+    for name in ("image", "parallel", "cpack", "build", "node", "cache", "report"):
         parser.add_argument(f"--{name}", required=True)
     parser.parse_known_args(namespace=TOOLS)
     try:
@@ -549,7 +571,8 @@ def main():
         print(f"skipped: {error}")
         return SKIPPED
     options = parser.parse_known_args()[1]
-    program = unittest.main(argv=[sys.argv[0], *options], verbosity=2, exit=False)
+    program = unittest.main(argv=[sys.argv[0], *options], testRunner=Report(verbosity=2), exit=False)
+    figures.add(TOOLS.report, REPORT, stale=REPORTED)
     return 0 if program.result.wasSuccessful() else 1
 
 

@@ -2,6 +2,7 @@
 """Several computers on one network, each with fingertips, as network namespaces of this one; and what reached a recorder.
 
     hosts.py FAKE_DEVICE cuts SECONDS          the account of a recording with its mishaps, as JSON; needs root
+    hosts.py FAKE_DEVICE latency SECONDS       what the way over Zenoh costs at the highest rate, as JSON
     hosts.py router ENDPOINT                   a router, until it is killed
 
 The truth of cuts is a second terminal of each fingertip (fake_device's mirror), which gets the same bytes a moment before the first.
@@ -26,10 +27,11 @@ sys.path.insert(0, str(PACKAGE))
 from fingertip import wire  # noqa: E402
 from fingertip.files import read_recording, recorded_devices  # noqa: E402
 from fingertip.mcap_recording import McapLineReader  # noqa: E402
+from fingertip.network import Stamp, parts_of  # noqa: E402
 
 from nightly import busy_s, wait_for  # noqa: E402
 
-HOSTS, TIPS, RATE_Hz = 4, 4, 50
+HOSTS, TIPS, RATE_Hz, FULL_RATE_Hz = 4, 4, 50, 1310
 UNPLUGGED = "F100"  # and back, after half of its frames
 PATIENCE_s = 90
 PORT = 7447
@@ -230,6 +232,58 @@ def cuts(fake_device, seconds):
         }
 
 
+def latency(fake_device, seconds):
+    import zenoh
+
+    endpoint = f"tcp/127.0.0.1:{PORT + os.getpid() % 1000}"
+    with tempfile.TemporaryDirectory(prefix="fingertip-") as name:
+        port = pathlib.Path(name) / "port"
+        environment = {**os.environ, "XDG_RUNTIME_DIR": name}
+        device = subprocess.Popen([fake_device, port, f"rate={FULL_RATE_Hz}", "life=600"])
+        bridge = None
+        try:
+            wait_for(port.is_symlink, "the fingertip")
+            words = command("bridge", "--listen", endpoint, "--router", "--port", port)
+            bridge = subprocess.Popen(words, env=environment, stderr=subprocess.DEVNULL)
+            config = zenoh.Config()
+            config.insert_json5("mode", '"client"')
+            config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+            config.insert_json5("connect/timeout_ms", "-1")
+            late_ns, taken, last = [], {"raw": 0}, [0]
+
+            def hear(sample):
+                kind = parts_of(str(sample.key_expr))[1]
+                if kind != "status":
+                    stamp = Stamp.of(sample.attachment.to_bytes())
+                    late_ns.append(time.time_ns() - stamp.taken_ns)
+                    taken[kind] = taken.get(kind, 0) + 1
+                    last[0] = stamp.number
+
+            with zenoh.open(config) as session:
+                subscriber = session.declare_subscriber("fingertip/*/*", hear)
+                wait_for(lambda: len(late_ns) > 2 * FULL_RATE_Hz, "packets")
+                begun_s, busy_before_s, frames, number = time.perf_counter(), busy_s(bridge.pid), taken["raw"], last[0]
+                late_ns.clear()
+                time.sleep(seconds)
+                wall_s, cpu_s = time.perf_counter() - begun_s, busy_s(bridge.pid) - busy_before_s
+                frames, number = taken["raw"] - frames, last[0] - number
+                found = sorted(late_ns)
+                subscriber.undeclare()
+        finally:
+            for process in (bridge, device):
+                if process:
+                    process.kill()
+                    process.wait()
+    return {
+        "zenoh_latency_median_ms": round(found[len(found) // 2] / 1e6, 3),
+        "zenoh_latency_99_ms": round(found[len(found) * 99 // 100] / 1e6, 3),
+        "zenoh_fps": round(frames / wall_s, 1),
+        "zenoh_bridge_core_percent": round(100 * cpu_s / wall_s, 1),
+        "zenoh_live_percent": round(100 * len(found) / max(number, 1), 2),
+        "zenoh_seconds": seconds,
+    }
+
+
 def router(endpoint):
     import zenoh
 
@@ -245,4 +299,4 @@ if __name__ == "__main__":
     if sys.argv[1] == "router":
         router(sys.argv[2])
     else:
-        print(json.dumps(cuts(sys.argv[1], int(sys.argv[3]))))
+        print(json.dumps({"cuts": cuts, "latency": latency}[sys.argv[2]](sys.argv[1], int(sys.argv[3]))))

@@ -12,6 +12,7 @@ from boards import BOARDS, PARALLEL, image_of
 from nightly import ROOT, figures_of, job, run
 from reporting import Steps
 
+from fingertip.files import InputError
 
 TESTS = ROOT / "tests"
 EMULATED = TESTS / "emulated"
@@ -28,6 +29,25 @@ def tools_of(build):
 
 def in_parallel(jobs):
     return Steps().run_all({key: (str(key), work) for key, work in jobs.items()}, os.cpu_count() or 1)
+
+
+@job("reliability", ("same_bits_presses", ">=", 10000), ("same_bits_different", "<=", 0), ("same_bits_failed", "<=", 0))
+def same_bits(build):
+    """Fits and grasps on a Cortex-M0+ (the RP2040's, emulated; QEMU's), a Cortex-M4F (QEMU) and this host, with every press."""
+    host, board = build / "tests/emulated/fit_bits/fit_bits", build.parent / BOARDS[0] / "fit_bits"
+    images = ("--host", host, "--m4f", f"{host}_m4f.elf", "--m0", f"{board}_m0.elf", "--rp2040", f"{board}_rp2040.bin")
+    test = EMULATED / "fit_bits/test_fit_bits.py"
+    words = ["/usr/bin/python3", test, *images, "--qemu", "qemu-system-arm", "--node", "node", "SameBits"]
+    done = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False)
+    compared = [int(count) for count in re.findall(r"same bits: (\d+) presses", done.stdout)]
+    if not compared:
+        raise InputError(f"{test.name} compared nothing: {done.stderr.strip()[-500:]}")
+    return {
+        "same_bits_presses": max(compared),
+        "same_bits_compared": sum(compared),
+        "same_bits_different": sum(int(count) for count in re.findall(r"(\d+) of \d+ differ", done.stderr)),
+        "same_bits_failed": done.returncode,
+    }
 
 
 @job(
@@ -80,6 +100,14 @@ def silicon(build):
     """What silicon at its corners and rare hosts do to the images of both boards."""
     run("ctest", "--test-dir", build, "-R", f"^checks.sensor_{SENSOR}_(configures|builds)$")
     return json.loads(run("node", EMULATED / "harness/figures.mjs", build.parent, *tools_of(build), build / "sensors" / SENSOR))
+
+
+@job("reliability", ("sync_error_us_max", "<=", 1), ("sync_alignment_us", "<=", 2))
+def shared_clock(build):
+    """Edges at the sync pins of both boards, and two fingertips on one wire."""
+    stamps = figures_of("node", EMULATED / "test_sync.mjs", build.parent, *tools_of(build))
+    wire = ("--image", image_of(build.parent, "pico_mux"), "--support", build / "tests/support", "--node", "node", "--report")
+    return stamps | figures_of("/usr/bin/python3", EMULATED / "test_sync_wire.py", *wire)
 
 
 @job("reliability", ("ubsan_calls", ">=", 1e8), ("ubsan_findings", "<=", 0))
@@ -146,3 +174,9 @@ def storing(build):
     """Frames while the emulated chip stores."""
     sys.path.insert(0, str(EMULATED))
     return importlib.import_module("storing").storing(build, build.parent)
+
+
+@job("reliability", ("analyzer_findings", "<=", 0))
+def analysis(build):
+    """clang-tidy, clang's analyser of paths, cppcheck, gcc's -fanalyzer and the mandatory rules of MISRA C:2012 over firmware/ and boards/."""
+    return figures_of("/usr/bin/python3", TESTS / "checks/analyse.py", "--build", build.parent, "--all", "--json")

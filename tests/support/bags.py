@@ -1,4 +1,6 @@
-"""Judges the MCAP recordings by three readers that know nothing of this project, with build/venv's Python.
+"""Judges the MCAP recordings by three readers that know nothing of this project, with build/venv's Python:
+
+    bags.py TOOL FAKE_DEVICE SECONDS TRUNCATIONS > figures.json
 
 What a bag must say is worked out here from the cells of its CSV file alone.
 """
@@ -17,6 +19,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import time
 
 import numpy as np
 import zstandard
@@ -299,8 +302,7 @@ def truncations(tool, bag, csv_path, folder, count, seed):
     return unread
 
 
-def main(tool, fake_device, seconds, count, random_frames):
-    """How many messages there are, and how many readers, files and conversions have otherwise than expected."""
+def main(tool, fake_device, seconds, count, random_frames=3000):
     figures = {"mcap_messages": 0, "mcap_messages_differ": 0, "mcap_bags_differ": 0, "mcap_round_trips_differ": 0}
     with tempfile.TemporaryDirectory(prefix="fingertip-") as name:
         folder = pathlib.Path(name)
@@ -312,7 +314,9 @@ def main(tool, fake_device, seconds, count, random_frames):
         write_random(random_csv, 7, random_frames)
         for number, path in enumerate((told, random_csv)):
             again, ours, python = (folder / f"{number}{end}" for end in (".csv", ".mcap", "_python.mcap"))
+            begin_s = time.process_time()
             of_python(path, python)
+            figures["mcap_python_us_per_line"] = round((time.process_time() - begin_s) / path.read_bytes().count(b"\n") * 1e6, 1)
             call(tool, "convert", path, ours)
             call(tool, "convert", python, again)
             figures["mcap_round_trips_differ"] += again.read_bytes() != path.read_bytes()
@@ -327,5 +331,15 @@ def main(tool, fake_device, seconds, count, random_frames):
             call(tool, "convert", middle, end)
             figures["mcap_round_trips_differ"] += end.read_bytes() != start.read_bytes()
             middle.unlink()
+        frames = sum(not line.startswith("#") for line in told.read_text(encoding="utf-8").splitlines()) - 1
+        figures |= {
+            "mcap_bytes_per_frame": round(bag.stat().st_size / frames),
+            "mcap_csv_bytes_per_frame": round(told.stat().st_size / frames),
+            "mcap_truncations": count,
+        }
         figures["mcap_truncations_unread"] = truncations(tool, bag, told, folder, count, 11)
     return figures
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(*sys.argv[1:3], float(sys.argv[3]), int(sys.argv[4]))))

@@ -12,10 +12,12 @@ def assert_within(case, found, bounds):
             case.assertLessEqual(found[key], most)
 
 
-def add(path, figures):
+def add(path, figures, stale=()):
+    """Without those of the names in stale, unless they are among the new figures."""
     path = pathlib.Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     whole = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    kept = {name: value for name, value in whole.items() if name not in stale}
     fresh = path.with_suffix(".new")
-    fresh.write_text(json.dumps({**whole, **figures}, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+    fresh.write_text(json.dumps({**kept, **figures}, indent=2, sort_keys=True) + "\n", encoding="utf-8")
     fresh.replace(path)

@@ -690,7 +690,8 @@ class Settable:
         prior_sigma_mm: the width to expect of a contact, 0.5 to 100, 0 is none.
         prior_width_mm: its standard deviation, 0.01 to 100, 0.5 if not given.
         location_limit_mm: UNCERTAIN above it, 0.01 to 100.
-        sync: the sync pin, one of in, frame, second, or off. Raises BadValueError before anything is sent. Returns how it is set now.
+        sync: the sync pin, one of in, frame, second, or off.
+        Raises BadValueError before anything is sent. Returns how it is set now.
         """
         return self._set({"rate_Hz": rate_Hz, "osr": osr, "slip_threshold_mm": slip_threshold_mm, "slip_window_ms": slip_window_ms,
                           "prior_sigma_mm": prior_sigma_mm, "prior_width_mm": prior_width_mm, "location_limit_mm": location_limit_mm, "sync": sync}, keep)

@@ -85,10 +85,9 @@ public:
   double delay_s = 0.0;                                  // of frames
   double frame_s = 1.0 / 410.0;
   std::array<double, 2> gain{1.0, 1.0}, load_share{1.0, 1.0};
-  double sd_share = 0.05; // of a force, as reported
-  double sigma_mm = 6.0;
-  double pulled_mm = 0.0;           // the place for each unit of tangential over normal force
-  std::array<double, 2> moved_mm{}; // besides
+  double sd_share = 0.05;                 // of a force, as reported
+  double sigma_mm = 6.0, pulled_mm = 0.0; // the latter: of the place, for each unit of tangential over normal force
+  std::array<double, 2> moved_mm{};       // of the place, besides
   std::array<bool, 2> slides{}, mute{}, frozen{};
   std::array<std::uint32_t, 2> add_flags{}, drop_flags{};
   bool active = true, gripper_mute = false, activated = false;

@@ -292,14 +292,12 @@ TEST(Grip, OpensByWhatEveryFingertipThatHadALoadReports) {
   }
 }
 
-// Whose object is taken without a pull of that force has handed it over.
 TEST(Grip, HandsOverWhatIsGone) {
   GripWorld world;
   world.grasp();
   world.pull(2.0, 0.3);
   world.run(2.0);
   ASSERT_TRUE(world.grip.request(GRIP_REQUEST_HAND_OVER));
-  world.run(0.1);
   world.object_mm = 0.0;
   world.run(0.2);
   EXPECT_EQ(world.report.state, GRIP_RELEASE);
