@@ -5,7 +5,6 @@
 #include "config/geometry.h"
 #include "port/port.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -58,7 +57,7 @@ void location_stage_process(struct location_stage *own, const int32_t *past_sd_P
 
 void location_stage_weigh(const struct contact_settings *contact, struct findings *found) {
   const float peak_Pa = (1.0f / 1024.0f) * (float)found->conditioned.peak_Pa_q10;
-  found->force = contact_weigh(contact, &found->fit, found->frame.saturated ? FLT_MAX : peak_Pa);
+  found->force = contact_weigh(contact, &found->fit, found->frame.saturated ? INFINITY : peak_Pa);
 }
 
 void location_stage_put(const struct findings *found, struct wire_contact *packet) {

@@ -364,6 +364,7 @@ static NOINLINE void add_moves(const struct moments *m, const struct moves *move
   uint32_t squares = *by_gains;
   int32_t sum = 0;
   for (int i = 0; i < COLUMNS; i++) {
+    // cppcheck-suppress uninitvar ; the caller has set as many
     int32_t column = moves->column[i], g = m->x.g_q14[i];
     UNROLL for (int j = 0; j < ROWS; j++) {
       int32_t move = (column * m->y.g_q14[j] + moves->row[j] * g) >> 15;

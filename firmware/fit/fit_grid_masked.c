@@ -399,6 +399,7 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   int32_t sum1 = 0, sum2 = 0, sum3 = 0;
   const struct node *node = c->node;
   for (int k = 0; k < NODES; k++) {
+    // cppcheck-suppress uninitvar ; NODES of them are set
     sum1 += (node->p1 * weighted[k]) >> NORM_SHIFT;
     sum2 += (node->p2 * weighted[k]) >> NORM_SHIFT;
     sum3 += (node->p3 * weighted[k]) >> NORM_SHIFT;

@@ -16,6 +16,7 @@ extern _Thread_local int fit_grid_columns, fit_grid_rows;
 #define ROWS fit_grid_rows
 #define MOST_COLUMNS FIT_GRID_MAX_NODES
 #define MOST_ROWS FIT_GRID_MAX_NODES
+#define MOST_ALONG FIT_GRID_MAX_NODES
 static inline void fit_use_rectangle(const struct fit_grid_shape *grid) {
   COLUMNS = grid->columns;
   ROWS = grid->rows;
@@ -25,11 +26,11 @@ static inline void fit_use_rectangle(const struct fit_grid_shape *grid) {
 #define ROWS FIT_GRID_ROWS
 #define MOST_COLUMNS COLUMNS
 #define MOST_ROWS ROWS
+#define MOST_ALONG (MOST_COLUMNS > MOST_ROWS ? MOST_COLUMNS : MOST_ROWS)
 #define fit_use_rectangle(grid) ((void)(grid))
 #endif
 #define NODES (COLUMNS * ROWS)
 #define MOST_NODES FIT_GRID_MOST_NODES
-#define MOST_ALONG (MOST_COLUMNS > MOST_ROWS ? MOST_COLUMNS : MOST_ROWS)
 #define ONE_Q26 (1 << 26)
 #define NOINLINE __attribute__((noinline))
 
