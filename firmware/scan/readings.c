@@ -3,7 +3,7 @@
 #define MAX_Pa_q10 (MS58XX_MAX_PRESSURE_Pa * 1024)
 
 /* The noise of all sensors together is no step (readings_take_pressures). */
-_Static_assert(FT_MAX_SENSORS *READINGS_STILL_NOISES *MS58XX_NOISE_MAX_Pa < MS58XX_STEP_Pa * 3 / 4,
+_Static_assert(FT_MAX_SENSORS *READINGS_STILL_NOISES *MS58XX_NOISE_MAX_Pa < MS58XX_STEP_Pa,
                "MS58XX_STEP_Pa is too small for the noise of this sensor");
 
 static uint32_t all_sensors(uint8_t sensor_count) {
@@ -147,7 +147,7 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], u
   uint32_t left_out = 0;
   frame->saturated = 0;
   if (usable != all_sensors(frame->sensor_count) || usable != readings->counted || (int32_t)glance.signs < 0 ||
-      step >= READINGS_JOLT_Pa_q10 - frame->sensor_count * noises) {
+      step + frame->sensor_count * noises >= READINGS_JOLT_Pa_q10) {
     left_out = look_closer(readings, frame, usable, last_Pa_q10, kept_Pa_q10);
   }
   readings->last_sum = glance.sum;
