@@ -218,15 +218,17 @@ def without_header(message):
 
 def differences(csv_path, bag):
     """How many messages, and how many of them one of the readers has otherwise than another, or than the CSV file says."""
-    first, second = in_order(by_mcap(bag)), in_order(by_rosbags(bag))
+    written = by_mcap(bag)
+    first, second = in_order(written), in_order(by_rosbags(bag))
     stream = by_mcap_stream(bag)
     differ = sum(a != b for a, b in zip(first, second)) + abs(len(first) - len(second)) + abs(len(first) - len(stream))
     lines = pathlib.Path(csv_path).read_bytes().decode("utf-8").split("\n")[:-1]
     expected = expected_contacts(csv_path)
-    by_topic = collections.defaultdict(list)
-    for topic, time_ns, message in first:
+    by_topic, last_ns = collections.defaultdict(list), 0
+    for topic, time_ns, message in written:
         stamp = message["header"]["stamp"]
-        differ += stamp["sec"] * 10**9 + stamp["nanosec"] != time_ns
+        last_ns = max(last_ns, stamp["sec"] * 10**9 + stamp["nanosec"])  # log times never step back
+        differ += last_ns != time_ns
         by_topic[topic.rsplit("/", 1)[-1]].append((time_ns, without_header(message)))
     contacts = {message["line"]: message for _, message in by_topic["contact"]}
     differ += sum(contacts.get(number) != message for number, message in expected.items()) + len(contacts.keys() - expected.keys())
