@@ -14,10 +14,8 @@ from unittest import mock
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "host_tools/report" / part) for part in ("shared", "measure", "shear", "../python", "../../tests/support")]
 import motion  # noqa: E402
-import numpy as np  # noqa: E402
 import static  # noqa: E402
-import touches  # noqa: E402
-from contacts import Contacts, q10  # noqa: E402
+from contacts import Contacts  # noqa: E402
 from figures import assert_within  # noqa: E402
 
 BUILD = sys.argv.pop()
@@ -86,29 +84,6 @@ class ShearStatic(unittest.TestCase):
         without = {(row["pad"], row["load"]): row["location_without_p50_mm"] for row in self.found["taps"]}
         self.assertAlmostEqual(without["equal gains", 0.1], 0.1 * 12 * 0.29, delta=0.06)
         self.assertAlmostEqual(without["equal gains", 0.3], 0.3 * 12 * 0.29, delta=0.06)
-
-    def test_a_pull_moves_any_shape_by_half_a_sigma_and_more(self):
-        """From which a grasp takes the load of long and flat contacts (grasp/control/finger.cpp, PULLED)."""
-        pads, count = CONTACTS.perfect_pads(100), np.arange(100)
-        for thing, least, most in (
-            ("sphere15", 0.58, 0.66),
-            ("edge20", 0.5, 0.62),
-            ("cylinder24", 0.45, 0.6),
-            ("cube18", 0.48, 0.56),
-            ("cube24", 0.44, 0.5),
-        ):
-            fits = []
-            for share in (0.0, 0.3):
-                touch = touches.draw(CONTACTS, touches.Case(pads, (thing,), share), CONTACTS.random(3, 1, count))
-                readings_Pa = CONTACTS.base_Pa(12.0, (thing,), 0 * count, touch, pads)[:, None]
-                fits.append(
-                    CONTACTS.tangential(CONTACTS.own_array, CONTACTS.pad_profile(12.0), CONTACTS.settings_of(pads, 1.0), q10(readings_Pa))[
-                        0
-                    ][:, 0]
-                )
-            inner = (np.abs(touch["x_mm"]) < 4.5) & (np.abs(touch["y_mm"]) < 13.5)
-            moved_mm = np.hypot(*(fits[1][axis] - fits[0][axis] for axis in ("x_mm", "y_mm")))
-            self.assertTrue(least < np.median((moved_mm / 0.3 / fits[0]["sigma_mm"])[inner]) < most, thing)
 
     def test_places_objects_and_pads_differ_as_they_should(self):
         place = self.rows("by_place", "case")

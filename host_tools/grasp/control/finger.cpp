@@ -28,9 +28,9 @@ constexpr std::uint32_t FORCE_ONLY =
     CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SATURATED | CONTACT_FLAG_ZERO_DOUBTFUL;
 // A place with one of these flags is not trusted. UNCERTAIN says that a pull may have moved it, which is what it is for.
 constexpr std::uint32_t NO_PLACE = FORCE_ONLY & ~std::uint32_t{CONTACT_FLAG_UNCERTAIN};
-// A pull of the contact's own force moves its place by this many sigmas, and more, whatever its shape: points by 0.62,
-// lines up to 24 mm by 0.55, areas up to 18 mm by 0.5, of 24 mm by 0.48 (12 mm of rubber; near corners 0.35 to 0.55).
-constexpr double PULLED = 0.5;
+// A tangential force as large as the normal one moves the Gaussian by this many sigmas at least, whatever the shape, but by
+// no more than 3.75 to 5 mm on 12 mm of rubber, however wide the contact is (unit.cell.face).
+constexpr double PULLED = 0.5, PULLED_mm = 3.75;
 constexpr double PULLS_s = 0.025; // one frame alone shows no pull
 constexpr std::uint32_t OVER = CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND;
 // A contact with a larger sigma is a plate. Its Gaussian reaches far beyond the pad, so only the part
@@ -86,7 +86,7 @@ void GripFinger::take(const GripTouch &touch) {
     sum_y_mm_ += touch.y_mm;
     places_++;
     const double moved_mm = has_zero_place_ ? std::hypot(touch.x_mm - zero_x_mm_, touch.y_mm - zero_y_mm_) : 0.0;
-    const double pulled = moved_mm / (PULLED * std::max(touch.sigma_mm, 1.0));
+    const double pulled = moved_mm / std::min(PULLED * std::max(touch.sigma_mm, 1.0), PULLED_mm);
     pulled_ = std::min(pulled, pulled_ + (pulled - pulled_) * std::min((touch.t_s - place_t_s_) / PULLS_s, 1.0));
     place_t_s_ = touch.t_s;
   }

@@ -26,8 +26,8 @@ constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 constexpr double CONVERSION_s = 2.3e-3, PROCESSING_s = 1.6e-3;
 constexpr double FORCE_NOISE = 0.004, FORCE_NOISE_N = 0.01, LOAD_NOISE_N = 0.015, PLACE_NOISE_mm = 0.012;
 constexpr double GATE_N = 0.05; // less is no contact
-// The twin's Gaussians on 12 mm of rubber: their sigma, and how far a pull of the contact's own force moves them.
-constexpr double POINT_mm = 6.0, LINE_mm = 7.2, AREA_mm = 9.0, PULLED = 0.55;
+// The twin's Gaussians on 12 mm of rubber: their sigma, and how far a tangential force as large as the normal one moves them.
+constexpr double POINT_mm = 6.0, LINE_mm = 7.2, AREA_mm = 14.0, PULLED = 0.55, PULLED_mm = 3.9;
 constexpr std::uint32_t SLIP_WINDOW_us = 100000;
 constexpr float SLIP_mm = 0.75F;
 constexpr double STEPS_s = 0.01, PATIENCE_s = 12.0, SAMPLED_s = 2e-3;
@@ -83,7 +83,7 @@ public:
       const double load_gain = load_share_ * pad_.gain;
       found.qx_N = static_cast<float>(mirror_ * (load_gain * load_N.x + pad_.ratio.x * sensed_N) + noise(LOAD_NOISE_N));
       found.qy_N = static_cast<float>(load_gain * load_N.y + pad_.ratio.y * sensed_N + noise(LOAD_NOISE_N));
-      const double moved_mm = share * (has_load ? pad_.crosstalk : PULLED * sigma_mm_);
+      const double moved_mm = share * (has_load ? pad_.crosstalk : std::min(PULLED * sigma_mm_, PULLED_mm));
       found.x_mm = static_cast<float>(mirror_ * (way_mm.x + moved_mm * load_N.x) + noise(PLACE_NOISE_mm));
       found.y_mm = static_cast<float>(way_mm.y + moved_mm * load_N.y + noise(PLACE_NOISE_mm));
       found.location_noise_mm = static_cast<float>(PLACE_NOISE_mm);

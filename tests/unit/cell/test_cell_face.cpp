@@ -4,6 +4,7 @@
 
 extern "C" {
 #include "config/geometry.h"
+#include "fit/fit.h"
 }
 
 #include <algorithm>
@@ -95,10 +96,45 @@ TEST(Face, AnAreaIsHeldInByItsOwnWidth) {
   const Pressures pressed = face.base_Pa(area);
   EXPECT_GT(pressed[7], 1.15 * pressed[2]);
   EXPECT_GT(pressed[2], 1.15 * pressed[0]);
-  area.pull_y_N = 3.0;
-  double most_Pa = 0.0;
-  for (std::size_t k = 0; k < SENSORS; k++) {
-    most_Pa = std::max(most_Pa, std::abs(face.base_Pa(area)[k] - pressed[k]));
+}
+
+// Location and sigma.
+static std::array<double, 3> fitted(const Pressures &base_Pa) {
+  fit_array array{};
+  EXPECT_EQ(fit_array_init(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm), FT_OK);
+  std::array<std::int32_t, SENSORS> q10{};
+  std::transform(base_Pa.begin(), base_Pa.end(), q10.begin(),
+                 [](double pressure_Pa) { return static_cast<std::int32_t>(std::lround(1024.0 * pressure_Pa)); });
+  fit_settings settings{};
+  settings.iterations = 7;
+  settings.noise_Pa_q10 = 5120;
+  fit_result result{};
+  fit_gaussian(&array, q10.data(), (1u << SENSORS) - 1, &settings, &result);
+  return {double{result.x_mm}, double{result.y_mm}, double{result.sigma_mm}};
+}
+
+// From which a grasp takes the load of long and flat contacts (grasp/control/finger.cpp: PULLED, PULLED_mm).
+TEST(Face, ATangentialForceMovesTheGaussianAsFarAsAGraspAssumes) {
+  const Face face("sphere15", 12.0, FINGERTIP_TEST_TABLES);
+  for (const double length_mm : {0.0, 12.0, 24.0, 36.0}) {
+    for (const double width_mm : {0.0, 12.0, 24.0, 36.0, 54.0}) {
+      for (const bool across : {false, true}) {
+        if (across && std::max(length_mm, width_mm) > 24.0) {
+          continue; // beyond the pad's own width it may move less
+        }
+        Patch patch;
+        patch.force_N = 5.0;
+        patch.length_mm = length_mm;
+        patch.width_mm = width_mm;
+        const auto [x_mm, y_mm, sigma_mm] = fitted(face.base_Pa(patch));
+        (across ? patch.pull_x_N : patch.pull_y_N) = 1.0;
+        patch.stuck_N = 3.0; // friction 0.5
+        const auto [to_x_mm, to_y_mm, to_sigma_mm] = fitted(face.base_Pa(patch));
+        const double assumed_mm = std::min(0.5 * to_sigma_mm, 3.75);
+        const double moved_mm = std::hypot(to_x_mm - x_mm, to_y_mm - y_mm) * patch.force_N;
+        EXPECT_GT(moved_mm, 0.9 * assumed_mm) << length_mm << " x " << width_mm << " mm, across: " << across;
+        EXPECT_LT(moved_mm, 1.9 * assumed_mm) << length_mm << " x " << width_mm << " mm, across: " << across;
+      }
+    }
   }
-  EXPECT_LT(most_Pa, 0.3 * pressed[7]); // the pull of an area hardly reaches them
 }

@@ -23,21 +23,14 @@ TEST(Convert, ATouchIsThePacketsContact) {
   EXPECT_EQ(static_cast<float>(touch.speed_y_mm_s), packet.body.contact.vy_mm_s);
 }
 
-TEST(Convert, WhatNoFlagStandsForIsZero) {
+TEST(Convert, WhatHasNoFlagOrIsNoNumberIsZero) {
   wire_packet packet = test::make_contact(0, 1, 7);
+  packet.body.contact.x_mm = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(touch_from_packet(packet, 5).x_mm, 0.0);
   packet.body.contact.force_N = 4;
   packet.body.contact.flags = CONTACT_FLAG_CONTACT;
   const GripTouch touch = touch_from_packet(packet, -1);
   for (const double value : {touch.force_N, touch.force_sd_N, touch.x_mm, touch.sigma_mm, touch.qx_N, touch.speed_x_mm_s, touch.t_s}) {
     EXPECT_EQ(value, 0.0);
   }
-}
-
-TEST(Convert, WhatIsNoNumberIsZero) {
-  wire_packet packet = test::make_contact(0, 1, 7);
-  packet.body.contact.force_N = std::numeric_limits<float>::quiet_NaN();
-  packet.body.contact.x_mm = std::numeric_limits<float>::infinity();
-  const GripTouch touch = touch_from_packet(packet, 5);
-  EXPECT_EQ(touch.force_N, 0.0);
-  EXPECT_EQ(touch.x_mm, 0.0);
 }
