@@ -7,6 +7,7 @@ struct step {
   struct condition *condition;
   struct condition_sensor *sensor;
   uint8_t k;
+  uint32_t usable;
   int32_t ms; /* since the last update */
   int32_t memory_share, wander_share;
   int32_t noise_Pa_q10;
@@ -56,11 +57,11 @@ static void follow_past(const struct step *step) {
 }
 
 /* What five and more sensors all keep is a force that is left: rubber keeps unlike shares. Of fewer it may be either. */
-static bool is_left_by_force(const struct condition *condition) {
+static bool is_left_by_force(const struct condition *condition, uint32_t usable) {
   int pressed = 0;
-  for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
+  for (uint8_t k = 0; usable != 0; k++, usable >>= 1) {
     const struct condition_sensor *sensor = &condition->sensor[k];
-    if (sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa)) {
+    if (usable & 1u && sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa)) {
       const int32_t off = clamped_difference(sensor->before_Pa_q10, sensor->level_Pa_q10);
       if (off <= part_of(sensor->past_Pa_q10, PAST_SHARE_FORCE)) {
         return false;
@@ -79,7 +80,8 @@ static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
     return;
   }
   step->condition->to_learn &= ~bit;
-  if (sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa) && !is_left_by_force(step->condition)) {
+  const bool shows = sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa) && step->condition->gate.released_ms < FRESH_ms;
+  if (shows && !is_left_by_force(step->condition, step->usable)) {
     const int32_t most = part_of(sensor->past_Pa_q10, PAST_SHARE_MOST);
     const int32_t off = clamp(size_of(above_level_Pa_q10) - step->condition->drifted_Pa_q10, 0, most);
     const int32_t shown = port_divide(off + off / 4, sensor->past_Pa_q10 >> 16);
@@ -225,7 +227,8 @@ static void set_zero(const struct step *step, int32_t remainder_Pa_q10, int32_t 
   set_bit(&condition->zero_risen, step->k, larger(sensor->taken_Pa_q10, spread) > Pa_q10(GATE_OPEN_Pa));
 }
 
-/* While the level may be off by a spread it takes over all readings within it. Returns whether it has. */
+/* While the level may be off by a spread it takes over all readings within it: so nothing shows what rubber keeps. Returns whether it has.
+ */
 static bool settle(const struct step *step) {
   struct condition *condition = step->condition;
   struct condition_sensor *sensor = step->sensor;
@@ -233,6 +236,7 @@ static bool settle(const struct step *step) {
   if (spread <= size_of(step->above_Pa_q10)) {
     return false;
   }
+  condition->to_learn &= ~(UINT32_C(1) << step->k);
   sensor->level_Pa_q10 += step->above_Pa_q10;
   int32_t goal = SETTLE_SLOW * size_of(step->slow_Pa_q10);
   goal = goal > spread ? spread : goal;
@@ -370,6 +374,7 @@ void update_sensor(struct condition *condition, const struct frame *frame, const
       .condition = condition,
       .sensor = sensor,
       .k = k,
+      .usable = conditioned->usable,
       .ms = ms,
       .memory_share = share_in(ms, MEMORY_ms),
       .wander_share = share_in(ms, WANDER_ms),

@@ -161,13 +161,14 @@ TEST(test_a_sensor_that_keeps_much_has_a_band_of_its_own) {
 
 /* A force that remains after presses, on all sensors, is not learnt as rubber's: a fifth of the next is a contact. */
 TEST(test_a_force_that_is_left_again_and_again_stays_a_force) {
-  for (size_t i = 0; i < FAST_PERIODS; i++) {
-    begin_calm(periods_us[i]);
+  for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
+    begin_calm(periods_us[i / 2]);
     for (int n = 0; n < 10; n++) {
       press(20000 * Pa);
       run_s(5);
-      press(2000 * Pa);
+      press((n > 0 || i % 2 ? 2000 : 0) * Pa);
       run_s(3);
+      frame.valid = i % 2 ? ALL : ALL & ~(1u << 6); /* which kept nothing before it failed */
       press(0);
       run_s(10);
     }
@@ -211,6 +212,45 @@ TEST(test_what_many_presses_leave_fades_in_the_next_one) {
     press(8000 * Pa);
     run_s(12);
     TEST_ASSERT_INT32_WITHIN(30 * Pa, 8000 * Pa, conditioned.pressure_Pa_q10[7]);
+  }
+}
+
+/* A sensor that is tared, in a press or after it, rests where it settles, by then 200 Pa higher. */
+TEST(test_a_sensor_that_settles_after_a_press_rests_there) {
+  for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
+    begin_calm(periods_us[i / 2]);
+    press(20000 * Pa);
+    run_s(1);
+    frame.renewed = i % 2 ? 1u << 7 : 0;
+    run(1);
+    press(0);
+    frame.renewed = 0;
+    run_s(0.1f);
+    frame.renewed = i % 2 ? 0 : 1u << 7;
+    run(1);
+    TEST_ASSERT_TRUE(i % 2 || conditioned.usable == (ALL & ~(1u << 7)));
+    frame.renewed = 0;
+    run_s(0.5f);
+    watch_s(1, 200, 1u << 7);
+    frame.pressure_Pa_q10[7] += 8000 * Pa;
+    run_s(6);
+    TEST_ASSERT_INT32_WITHIN(40 * Pa, 8000 * Pa, conditioned.pressure_Pa_q10[7]);
+  }
+}
+
+/* One that was away, or has not settled, teaches nothing. */
+TEST(test_what_a_sensor_keeps_shows_after_the_press_alone) {
+  for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
+    begin(periods_us[i / 2]);
+    run_s(i % 2 ? 1 : 60);
+    press(20000 * Pa);
+    run_s(3);
+    press(0);
+    frame.valid = i % 2 ? ALL : ALL & ~(1u << 7);
+    run_s(5);
+    frame.valid = ALL;
+    run_s(5);
+    TEST_ASSERT_EQUAL(PAST_SHARE, condition.sensor[7].past_share);
   }
 }
 

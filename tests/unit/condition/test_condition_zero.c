@@ -208,17 +208,6 @@ TEST(test_what_compensation_costs_is_no_contact) {
   }
 }
 
-TEST(test_zero_stands_still_during_contact) {
-  begin_calm(4854);
-  press(10000 * Pa);
-  run_s(60);
-  TEST_ASSERT_TRUE(conditioned.contact);
-  TEST_ASSERT_FALSE(conditioned.zero_doubtful);
-  for (int k = 0; k < SENSORS; k++) {
-    TEST_ASSERT_INT32_WITHIN(Pa / 4, AMBIENT, condition.zero_Pa_q10[k]);
-  }
-}
-
 /* A drift seen before goes on in the contact, for an hour; what is no drift does not. */
 TEST(test_drift_goes_on_during_contact) {
   for (size_t i = 0; i < PERIODS; i++) {
@@ -304,23 +293,6 @@ TEST(test_reading_below_zero_is_tared_anew_when_it_stays) {
       TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
     }
   }
-}
-
-/* A sensor that took another's place has another zero; the others keep theirs. */
-TEST(test_another_sensor_is_tared_anew) {
-  begin_calm(4854);
-  TEST_ASSERT_TRUE(conditioned.tared);
-  frame.pressure_Pa_q10[4] += 300 * 1024;
-  frame.renewed = 1u << 4;
-  run(1);
-  frame.renewed = 0;
-  TEST_ASSERT_FALSE(conditioned.tared);
-  TEST_ASSERT_FALSE(conditioned.contact);
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~(1u << 4), conditioned.usable);
-  run(ZERO_TARE_FRAMES);
-  TEST_ASSERT_TRUE(conditioned.tared);
-  TEST_ASSERT_FALSE(conditioned.contact);
-  TEST_ASSERT_EQUAL_INT32(0, conditioned.pressure_Pa_q10[4]);
 }
 
 /* Its supply dipped while the zero was taken, which is found out when it has been reset. A zero from long before is its own. */
