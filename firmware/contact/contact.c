@@ -24,7 +24,8 @@ struct contact_force contact_weigh(const struct contact_settings *settings, cons
   const float force_N = exceeds ? fit->force_N * largest_Pa / fit->p0_Pa : fit->force_N;
   struct contact_force weighed = {settings->force_scale * force_N, 0.0f};
   if (fit->flags & CONTACT_FLAG_UNCERTAINTY_VALID) {
-    weighed.force_sd_N = fit_quadrature(settings->force_scale, exceeds ? force_N : fit->force_sd_N, settings->force_scale_sd, force_N);
+    const float sd_N = exceeds ? fit_quadrature(1.0f, fit->force_sd_N, 1.0f, fit->force_N - force_N) : fit->force_sd_N;
+    weighed.force_sd_N = fit_quadrature(settings->force_scale, sd_N, settings->force_scale_sd, force_N);
   }
   return weighed;
 }

@@ -46,7 +46,7 @@ bool contact_is_lower_bound(const struct fit_result *fit, uint32_t saturated);
 
 /* The force of a fit, scaled; its standard deviation holds that of the scale. largest_Pa: reading, of any size where a
  * sensor is saturated. A fit at its bound, or whose middle is not known to within its width, may have any pressure
- * there: its force is at most what the largest reading makes of its width, and so is its standard deviation. */
+ * there: its force is at most what the largest reading makes of its width, and its standard deviation holds what is cut. */
 struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit, float largest_Pa);
 
 /* Without slip. */

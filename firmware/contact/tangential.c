@@ -183,9 +183,6 @@ static void weigh_force(struct fit_tangential *found) {
   sd_q26 = sd_q26 < RATIO_SD_MIN_Q26 ? RATIO_SD_MIN_Q26 : sd_q26;
   const int32_t pulled = pulled_q14(ratio_x_q26, ratio_y_q26, sd_q26);
   const int32_t not_pulled = (1 << 14) - pulled;
-  if (not_pulled == 0) {
-    return;
-  }
   const int32_t *moved = found->moved_q20_mm;
   const int32_t dx_q20 = fixed_mul_q26(ratio_x_q26, moved[0]);
   const int32_t dy_q20 = fixed_mul_q26(ratio_y_q26, moved[1]);
