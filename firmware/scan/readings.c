@@ -2,9 +2,8 @@
 
 #define MAX_Pa_q10 (MS58XX_MAX_PRESSURE_Pa * 1024)
 
-/* The noise of all sensors together is no step (readings_take_pressures). */
-_Static_assert(FT_MAX_SENSORS *READINGS_STILL_NOISES *MS58XX_NOISE_MAX_Pa < MS58XX_STEP_Pa,
-               "MS58XX_STEP_Pa is too small for the noise of this sensor");
+/* Noise is no step. That of many sensors together may be a jolt: then every frame is searched. */
+_Static_assert(READINGS_STILL_NOISES *MS58XX_NOISE_MAX_Pa < MS58XX_STEP_Pa, "MS58XX_STEP_Pa is too small for the noise of this sensor");
 
 static uint32_t all_sensors(uint8_t sensor_count) {
   /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */

@@ -268,17 +268,6 @@ TEST(test_pressures_below_zero_are_left_out_and_the_second_makes_a_suspect) {
   TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
 }
 
-/* All of them, of every sensor: what the pad is pressed with. */
-TEST(test_saturation_counts) {
-  start();
-  for (int k = 0; k < SENSORS; k++) {
-    step_by(k, 150e3);
-  }
-  take_pressures(ALL);
-  expect(ALL, 0);
-  TEST_ASSERT_EQUAL_HEX32(ALL, frame.saturated);
-}
-
 TEST(test_a_temperature_step_needs_a_second_and_makes_a_suspect) {
   static const struct {
     double first_degC, second_degC;
@@ -304,17 +293,6 @@ TEST(test_a_temperature_step_needs_a_second_and_makes_a_suspect) {
     TEST_ASSERT_DOUBLE_WITHIN(0.01, cases[i].suspect ? 0.0 : rest_Pa, frame.pressure_Pa_q10[ONE] / 1024.0);
     d2[ONE] = rest;
   }
-}
-
-TEST(test_doubt_ends_with_a_temperature_like_the_last) {
-  start();
-  const uint32_t rest = d2[ONE];
-  warm_by(ONE, 9);
-  take_temperature();
-  d2[ONE] = rest;
-  TEST_ASSERT_EQUAL_HEX32(0, take_temperature());
-  take_pressures(ALL);
-  TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
 }
 
 /* Whatever the others do. Where their pressures have fallen too, the first such temperature does; where they have not,
@@ -351,7 +329,8 @@ TEST(test_doubt_for_ever_is_not_asked_about_for_ever) {
   }
   TEST_ASSERT_LESS_THAN_INT(6, asked);
   d2[ONE] = rest;
-  take_temperature();
+  TEST_ASSERT_EQUAL_HEX32(0, take_temperature());
+  TEST_ASSERT_EQUAL_HEX32(0, readings.doubtful);
   warm_by(ONE, 10);
   TEST_ASSERT_EQUAL_HEX32(READINGS_ASK_AGAIN, take_temperature());
 }

@@ -49,15 +49,6 @@ TEST(test_prom_misread_in_a_whole_admission_is_read_again) {
   TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
 }
 
-/* One bit of C1, and the sensor reads 28 kPa more than the others: its gain is off by 10 %. */
-TEST(test_prom_that_makes_a_sensor_stand_apart_is_not_used) {
-  fake.prom[DISTURBED].word[1] ^= 0x1000;
-  run_until(8000000);
-  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, value_of(&scan.prom_bad));
-  assert_good_frame(ALL & ~DISTURBED_BIT);
-  TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
-}
-
 TEST(test_blank_prom_is_not_admitted_and_asked_ever_more_rarely) {
   memset(&fake.prom[DISTURBED], 0, sizeof fake.prom[DISTURBED]);
   run_until(32000000);
