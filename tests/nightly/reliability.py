@@ -129,13 +129,14 @@ def undefined(build):
     ("wrong_unflagged_frames", "<=", 0),
     ("false_slips", "<=", 0),
     ("raw_valid_wrong", "<=", 0),
+    ("never_trusted", "<=", 0),
     ("reset_ms_max", "<=", 30),
     ("wrong_range_trusted", "<=", 0),
 )
 def dips(build):
     """Supplies of 1 to 15 sensors that dip amid a press: 16 phases of a frame, six shares of the true codes, both boards."""
     *rows, other_range = map(json.loads, re.findall(r"(?m)^{.*}$", run("env", "DIPS=1 1", build / "tests/unit/app/test_app_dips")))
-    total = {name: sum(row[name] for row in rows) for name in ("wrong_unflagged_frames", "false_slips", "raw_valid_wrong")}
+    total = {name: sum(row[name] for row in rows) for name in ("wrong_unflagged_frames", "false_slips", "raw_valid_wrong", "never_trusted")}
     cases, reset_ms = (how(row[name] for row in rows) for how, name in ((sum, "cases"), (max, "reset_ms_max")))
     return {"dip_cases": cases, **total, "reset_ms_max": reset_ms, **other_range, "dips": rows}
 
