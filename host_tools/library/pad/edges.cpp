@@ -188,8 +188,8 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std:
       places.push_back({x_mm, y_mm});
     }
   }
-  const bool calibrated = (info.stored & WIRE_STORED_CALIBRATION) != 0 && info.calibration.dip_share_q16 > 0;
-  if (calibrated) {
+  const bool calibrated = (info.stored & WIRE_STORED_CALIBRATION) != 0;
+  if (calibrated && info.calibration.dip_share_q16 > 0) {
     estimate.take_dip(block, places);
   }
   std::vector<Contact> contacts[3]; // without load, pulled along x, along y

@@ -157,6 +157,7 @@ class Gains(CalibrateTest):
             self.assertEqual(err, "")
             _, err = self.run_cli("pad", "--thickness", "12", "--overhang", "30", "--port", self.port)
             self.assertEqual(err, "")
+            self.assertIn("fingertip pad --thickness 12 --overhang 30\n", self.calibrate("--erase", "--yes", "--port", self.port)[0])
         with self.device(f"serial={serial}"):
             out, err = self.calibrate(*write)
             self.assertNotIn("profile of a pad", out)

@@ -130,6 +130,16 @@ TEST(PadEdges, TakeBackWhatACalibrationLeaves) {
   take_back(info, 0.0125F, 0.03);
 }
 
+/* Forces are in the scale of the calibration then, whether it has found a dip or not. */
+TEST(PadEdges, AreInTheScaleOfACalibration) {
+  wire_info info = pad::own_sensors();
+  const pad_edges without = pad::edges_of(profile(), info, FINGERTIP_TABLES_DIR);
+  info.stored = WIRE_STORED_CALIBRATION;
+  const pad_edges with = pad::edges_of(profile(), info, FINGERTIP_TABLES_DIR);
+  EXPECT_GT(with.force[0], without.force[0] + 0.01F);
+  EXPECT_NEAR((1.0F + with.force[0]) * without.force[1], (1.0F + without.force[0]) * with.force[1], 1e-6F);
+}
+
 TEST(PadEdges, SayLittleFarFromThem) {
   pad_profile near = profile(), far = profile();
   far.overhang_mm = 20.0F;

@@ -255,6 +255,14 @@ void show(const CalibrateOptions &options) {
   print_gains(info.calibration, info.sensor_count);
 }
 
+// The coefficients of the pad's ends are of a calibration, or of none.
+void advise_ends(const wire_info &info, const std::string &thickness) {
+  if ((info.stored & WIRE_STORED_PAD) && info.pad.overhang_mm > 0) {
+    std::printf("where the rubber ends, once more: fingertip pad%s --overhang %s\n", thickness.c_str(),
+                shortest(info.pad.overhang_mm).c_str());
+  }
+}
+
 void erase(const CalibrateOptions &options) {
   CalibratedDevice device(options);
   if (!(device.info().stored & (WIRE_STORED_CALIBRATION | WIRE_STORED_DAMAGED))) {
@@ -264,6 +272,7 @@ void erase(const CalibrateOptions &options) {
   confirm(options, "Forget the calibration of " + text_field(device.info().serial) + "?", "not erased");
   device.erase();
   std::printf("erased: it is as if never calibrated\n");
+  advise_ends(device.info(), " --thickness " + shortest(device.info().pad.thickness_mm));
 }
 
 template <typename Made> void write(const CalibrateOptions &options, CalibratedDevice &device, const Made &made) {
@@ -285,9 +294,7 @@ void use_thickness(CalibratedDevice &device, const calibration &made, const std:
     if (!other.empty()) {
       std::fprintf(stderr, "fingertip: %s; fingertip pad takes the one that was found\n", other.c_str());
     }
-    if (info.pad.overhang_mm > 0) {
-      std::printf("where the rubber ends, once more: fingertip pad --overhang %s\n", shortest(info.pad.overhang_mm).c_str());
-    }
+    advise_ends(info, "");
   }
 }
 
