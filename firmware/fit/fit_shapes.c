@@ -8,7 +8,6 @@
 #define MODEL_SD_Q16 131 /* 0.002 of the largest reading */
 /* Readings whose errors are more than 3 % of their unit determine no shape. */
 #define BASE_MAX_Q22 (1 << 17)
-#define LOG2E_HALF_FLOAT 0.72134752f
 /* Frames of a contact, counted from 1. The tangential force joins its model once the line has settled. From the first
  * that answers on, one frame answers where the models are, and the next steps. */
 #define FIRST_WITH_FORCE 10
@@ -58,8 +57,8 @@ static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fi
       value[AMPLITUDE] = fixed_clamp(value[AMPLITUDE], AMPLITUDE_LEAST, AMPLITUDE_MAX);
       value[PLACE_X] += dx_q20;
       value[PLACE_Y] += dy_q20;
-      value[PLACE_X] = fixed_clamp(value[PLACE_X], -PLACE_X_MAX, PLACE_X_MAX);
-      value[PLACE_Y] = fixed_clamp(value[PLACE_Y], -PLACE_Y_MAX, PLACE_Y_MAX);
+      value[PLACE_X] = fixed_clamp(value[PLACE_X], MIDDLE_OF(COLUMNS) - PLACE_MAX_OF(COLUMNS), MIDDLE_OF(COLUMNS) + PLACE_MAX_OF(COLUMNS));
+      value[PLACE_Y] = fixed_clamp(value[PLACE_Y], MIDDLE_OF(ROWS) - PLACE_MAX_OF(ROWS), MIDDLE_OF(ROWS) + PLACE_MAX_OF(ROWS));
       for (int u = m == ROUND ? SPAN_X : PULL_X; m != TWO && u < unknowns_of[m]; u++) {
         value[u] = shifted(fixed_mul_16(value[u], share_q13), 3);
       }

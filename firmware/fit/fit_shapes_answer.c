@@ -62,8 +62,6 @@ static NOINLINE float sd_of(struct scaled scale, struct scaled form, struct scal
   return product_of(scale, fit_scaled_sqrt(scaled_mul(fit_scaled_short(form), variance)));
 }
 
-static const struct scaled one = {1 << 14, -14};
-
 static NOINLINE void put_two(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations, const int32_t *at,
                              const struct scales *scales, struct fit_shapes_result *result) {
   for (int c = 0; c < 2; c++) {
@@ -84,7 +82,7 @@ static NOINLINE void put_two(const struct fit_shapes_pad *pad, const struct fit_
 static NOINLINE float sd_of_both(const struct fit_shapes_equations *equations, int first, const struct scales *scales) {
   struct scaled both =
       scaled_add(variance_of(equations, first, ONE_Q20, first + 1, 0), variance_of(equations, first + 1, ONE_Q20, first, 0));
-  return sd_of(one, both, scales->variance);
+  return sd_of(ONE, both, scales->variance);
 }
 
 /* Along an edge the contact's variance is larger than across, by that of a line. */
@@ -94,7 +92,7 @@ static NOINLINE bool is_edge(const struct fit_shapes_equations *equations, const
   int32_t by_q20[UNKNOWNS] = {[SPREAD] = -ONE_Q20};
   by_q20[SPAN_X] = 2 * fixed_mul_16(at->value[SPAN_X], THIRD_Q16);
   by_q20[SPAN_Y] = 2 * fixed_mul_16(at->value[SPAN_Y], THIRD_Q16);
-  float sd = sd_of(one, variance_of_sum(equations, by_q20), scales->variance);
+  float sd = sd_of(ONE, variance_of_sum(equations, by_q20), scales->variance);
   return fit_float(more_q20 - LEAST_VARIANCE_Q20, -20) > EDGE_SURE * fit_quadrature(1.0f, sd, 1.0f, pull_sd);
 }
 
@@ -106,7 +104,7 @@ static NOINLINE void put_edge(const struct fit_shapes_equations *equations, cons
   result->along_x = along * x;
   result->along_y = along * y;
   struct scaled across = variance_of(equations, SPAN_X, fit_fixed(-result->along_y, 20), SPAN_Y, fit_fixed(result->along_x, 20));
-  result->angle_sd_rad = fit_quadrature(per, sd_of(one, across, scales->variance), 3.0f * per * per, pull_sd);
+  result->angle_sd_rad = fit_quadrature(per, sd_of(ONE, across, scales->variance), 3.0f * per * per, pull_sd);
 }
 
 /* Of one contact: whether it is long, or else pulled. */
@@ -153,10 +151,10 @@ static bool explains_as_well(int32_t chi_square_q8, int32_t than_q8) {
  * contact, or what the models of a pull are off by. Of squares, discs (4) and balls (5), squares of the same spread overlap last. */
 static bool can_be_two(const struct fit_shapes_at *pair) {
   const int32_t *at = pair->value, square_q20 = fit_shapes_span_square(at);
-  int32_t reach_x = (int32_t)(fixed_size(at[PLACE_X]) + fixed_size(at[SPAN_X]));
-  int32_t reach_y = (int32_t)(fixed_size(at[PLACE_Y]) + fixed_size(at[SPAN_Y]));
+  int32_t reach_x = (int32_t)(fixed_size(at[PLACE_X] - MIDDLE_OF(COLUMNS)) + fixed_size(at[SPAN_X]));
+  int32_t reach_y = (int32_t)(fixed_size(at[PLACE_Y] - MIDDLE_OF(ROWS)) + fixed_size(at[SPAN_Y]));
   return square_q20 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10 && square_q20 > SQUARE * at[SPREAD] &&
-         reach_x < COLUMNS / 2 * ONE_Q20 + BESIDE_Q20 && reach_y < ROWS / 2 * ONE_Q20 + BESIDE_Q20;
+         reach_x < (COLUMNS - 1) * (ONE_Q20 / 2) + BESIDE_Q20 && reach_y < (ROWS - 1) * (ONE_Q20 / 2) + BESIDE_Q20;
 }
 
 int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8, const struct fit_shapes_at *at) {

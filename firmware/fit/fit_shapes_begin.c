@@ -5,7 +5,9 @@
 
 #include <math.h>
 
-static int32_t pitches_q20(float pitches) { return fixed_clamp(fit_fixed(pitches, 20), -PLACE_Y_MAX, PLACE_Y_MAX); }
+/* A pair may start beyond the limits of a step. */
+#define START_MAX (((COLUMNS > ROWS ? COLUMNS : ROWS) / 2 * 2 + 3) * (ONE_Q20 / 2))
+static int32_t pitches_q20(float pitches) { return fixed_clamp(fit_fixed(pitches, 20), -START_MAX, START_MAX); }
 
 /* Where the pair may be: along the Gaussian's longer axis, equal or three to one either way; or
  * under the largest reading and where it leaves most. */

@@ -9,7 +9,6 @@
 /* A twelfth of the line's square: half of what it adds to a spread, as steps do not know of it. */
 #define LINE_Q16 5461
 #define KAPPA_Q14 21299 /* 1.3, as in fit_tangential.c */
-#define LOG2E_HALF_FLOAT 0.72134752f
 #define SQUARE_MAX_Q24 (40 << 24)
 
 struct blob {

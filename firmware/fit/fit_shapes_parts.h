@@ -24,10 +24,11 @@ _Static_assert(MODELS == FIT_SHAPES_PARTS, "a part for each");
 #define ONE_Q20 (1 << 20)
 #define FREEDOM (NODES > 7 ? NODES - 6 : 1) /* readings and priors less the unknowns of two */
 #define PER_SD_MAX_Q4 1024
+#define LOG2E_HALF_FLOAT 0.72134752f
 
-/* One and a half pitches beyond the outer nodes. */
-#define PLACE_X_MAX ((2 * (COLUMNS / 2) + 3) * (ONE_Q20 / 2))
-#define PLACE_Y_MAX ((2 * (ROWS / 2) + 3) * (ONE_Q20 / 2))
+/* The middle of this number of nodes, from their origin; and one and a half pitches beyond the outer nodes, from there. */
+#define MIDDLE_OF(nodes) ((nodes) % 2 ? 0 : -(ONE_Q20 / 2))
+#define PLACE_MAX_OF(nodes) (((nodes) + 2) * (ONE_Q20 / 2))
 #define AMPLITUDE_MAX ((4 << 20) - 1)
 #define AMPLITUDE_LEAST (1 << 13)
 

@@ -153,7 +153,7 @@ static NOINLINE void substitute(const struct fit_shapes_equations *equations, co
 
 static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model, const struct fit_shapes_equations *equations,
                                const int32_t *x_q20, struct fit_shapes_at *at) {
-  const int32_t limit_of[UNKNOWNS] = {AMPLITUDE_MAX, PLACE_X_MAX, PLACE_Y_MAX, 0, ONE_Q20 / 8, SPAN_MAX, SPAN_MAX, 0, 0};
+  const int32_t limit_of[UNKNOWNS] = {AMPLITUDE_MAX, PLACE_MAX_OF(COLUMNS), PLACE_MAX_OF(ROWS), 0, ONE_Q20 / 8, SPAN_MAX, SPAN_MAX, 0, 0};
   int32_t move[UNKNOWNS], most_q14 = 1 << 14;
   int32_t amplitude = at->value[AMPLITUDE];
   for (int u = 0; u < equations->count; u++) {
@@ -178,8 +178,9 @@ static NOINLINE void take_step(const struct fit_shapes_pad *pad, int model, cons
       move[u] = fixed_mul_16(move[u], share_q14) * 4;
     }
     move[u] = fixed_clamp(move[u], -(1 << 22), 1 << 22);
+    const int32_t middle = u == PLACE_X ? MIDDLE_OF(COLUMNS) : u == PLACE_Y ? MIDDLE_OF(ROWS) : 0;
     at->value[u] = u == SPREAD ? fixed_clamp(at->value[u] + move[u], pad->spread_least_q20, pad->spread_most_q20)
-                               : fixed_clamp(at->value[u] + move[u], -limit, limit);
+                               : fixed_clamp(at->value[u] + move[u], middle - limit, middle + limit);
   }
   if (at->value[AMPLITUDE] < AMPLITUDE_LEAST) {
     at->value[AMPLITUDE] = AMPLITUDE_LEAST;

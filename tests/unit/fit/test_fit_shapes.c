@@ -377,15 +377,44 @@ TEST(test_a_pair_is_apart_and_on_the_array) {
     pair[SPREAD] = 9 * (ONE_Q20 / 64) / 3 - 1 + touching;
     TEST_ASSERT_EQUAL(touching == 0, is_two());
   }
-  const int32_t beside[2] = {ONE_Q20 + half, 2 * ONE_Q20 + half};
-  for (int i = 0; i < 8; i++) {
-    const int axis = i & 1, sign = i & 2 ? 1 : -1, side = i & 4 ? 1 : -1;
+  for (int i = 0; i < 16; i++) {
+    const int axis = i & 1, sign = i & 2 ? 1 : -1, side = i & 4 ? 1 : -1, even = i & 8 ? 1 : 0;
+    const struct fit_grid_shape grid = {.columns = (uint8_t)(3 + even), .rows = (uint8_t)(5 + even)}; /* whose middle is no node */
+    fit_use_rectangle(&grid);
     set_pair(0, 0);
     pair[SPAN_X + axis] = side * half;
-    pair[PLACE_X + axis] = sign * (beside[axis] - half - 1);
+    pair[PLACE_X] = pair[PLACE_Y] = -even * half;
+    pair[PLACE_X + axis] += sign * ((axis ? grid.rows : grid.columns) * half - half - 1);
     TEST_ASSERT_TRUE(is_two());
     pair[PLACE_X + axis] += 3 * sign;
     TEST_ASSERT_FALSE(is_two());
+  }
+}
+
+/* Beside a square of sixteen, when the Gaussian jumps far from it. */
+TEST(test_a_place_is_held_as_far_beside_each_side) {
+  for (int i = 0; i < 4; i++) {
+    struct fit_settings settings = usual();
+    struct fit_result fit;
+    float x_mm[16], y_mm[16];
+    int32_t pressure_Pa_q10[16];
+    const float side = i & 2 ? 1.0f : -1.0f;
+    settings.own = NULL;
+    for (int k = 0; k < 16; k++) {
+      x_mm[k] = 9.0f * ((float)(k / 4) - 1.5f);
+      y_mm[k] = 9.0f * ((float)(k % 4) - 1.5f);
+      const double dx_mm = (double)(x_mm[k] - side * 9.0f), dy_mm = (double)(y_mm[k] - side * 9.0f);
+      pressure_Pa_q10[k] = (int32_t)(1024.0 * pad_pressure_Pa(&rubber.profile, 4.0, dx_mm, dy_mm, (struct pad_load){5.0, 0.0, 0.0}));
+    }
+    TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, 16, x_mm, y_mm, 9.0f));
+    TEST_ASSERT_EQUAL(FT_OK, fit_shapes_init(&pad, &array, &rubber.profile));
+    fit_gaussian(&array, pressure_Pa_q10, 0xFFFF, &settings, &fit);
+    begin();
+    fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
+    *(i & 1 ? &fit.y_mm : &fit.x_mm) += side * 50.0f;
+    fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
+    const int32_t place_q20 = state.at[ROUND].value[i & 1 ? PLACE_Y : PLACE_X] + ONE_Q20 / 2;
+    TEST_ASSERT_INT32_WITHIN(ONE_Q20 / 4, (int32_t)side * 3 * ONE_Q20, place_q20);
   }
 }
 
