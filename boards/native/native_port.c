@@ -20,7 +20,6 @@ static struct {
   uint64_t fed_us;
   uint64_t alive_us[PORT_PARTS];
   bool watched[PORT_PARTS];
-  uint64_t events;
   unsigned at_once;
   uint64_t limit_us; /* of the run; sleep ends there */
   bool watchdog_expired;
@@ -89,7 +88,6 @@ static void count_at_once(void) {
 
 static void take_event(uint64_t t_us) {
   pass_time_to(t_us);
-  native.events++;
   count_at_once();
   if (native.alarm_us <= native.now_us) {
     native.alarm_us = UINT64_MAX;
@@ -122,8 +120,6 @@ enum native_end native_run_until(uint64_t t_us, void (*main_round)(void *context
 }
 
 bool native_watchdog_expired(void) { return native.watchdog_expired; }
-
-uint64_t native_event_count(void) { return native.events; }
 
 uint64_t port_now_us(void) { return native.now_us; }
 

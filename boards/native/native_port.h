@@ -47,6 +47,3 @@ enum native_end native_run_until(uint64_t t_us, void (*main_round)(void *context
 
 /* The watchdog would have struck: it was not fed for PORT_WATCHDOG_PERIOD_us, or in vain. */
 bool native_watchdog_expired(void);
-
-/* Events since start. */
-uint64_t native_event_count(void);

@@ -23,8 +23,6 @@ void native_sync_edge(void) {
 
 enum port_sync native_sync_mode(void) { return native.mode; }
 
-bool native_sync_level(void) { return native.level; }
-
 unsigned native_sync_pulses(void) { return native.pulses; }
 
 void port_sync_set(enum port_sync mode) {

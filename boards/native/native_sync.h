@@ -11,8 +11,5 @@ void native_sync_edge(void);
 
 enum port_sync native_sync_mode(void);
 
-/* As port_sync_write() left it. */
-bool native_sync_level(void);
-
-/* Rises of it since start-up. */
+/* Rises of the pin since start-up. */
 unsigned native_sync_pulses(void);

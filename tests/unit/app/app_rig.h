@@ -23,6 +23,7 @@ static bool rig_is_parallel; /* a data line for each sensor; else behind multipl
 static struct app app;
 static struct wire_receiver receiver;
 static uint16_t host_sequence;
+static unsigned rig_events;
 
 /* The press that the world applies. */
 static struct {
@@ -52,7 +53,10 @@ static inline double world_pressure_Pa(void *context, unsigned sensor, uint64_t 
 
 static inline uint64_t next_event_us(const void *context) { return sim_array_next_event_us(context); }
 
-static inline void on_event(void *context) { app_on_event(context); }
+static inline void on_event(void *context) {
+  rig_events++;
+  app_on_event(context);
+}
 
 static inline void main_round(void *context) { app_run(context); }
 

@@ -77,7 +77,10 @@ TEST(info_tells_what_this_is) {
   TEST_ASSERT_EQUAL_STRING("native", info.board);
   TEST_ASSERT_EQUAL_STRING(build_info.scene, info.scene);
   TEST_ASSERT_EQUAL_FLOAT(9.0f, info.pitch_mm);
-  TEST_ASSERT_EQUAL_FLOAT(-18.0f, info.y_mm[0]);
+  for (int k = 0; k < 15; k++) { /* three strips (De Clercq et al., RA-L 2022) */
+    TEST_ASSERT_EQUAL_FLOAT(9.0f * (float)(k / 5 - 1), info.x_mm[k]);
+    TEST_ASSERT_EQUAL_FLOAT(9.0f * (float)(k % 5 - 2), info.y_mm[k]);
+  }
   TEST_ASSERT_EQUAL_UINT16(1024, info.osr);
   TEST_ASSERT_UINT32_WITHIN(20000, 185000, info.measured_rate_mHz);
   TEST_ASSERT_EQUAL_UINT16(100, info.slip_window_ms);

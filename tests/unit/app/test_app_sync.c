@@ -108,7 +108,6 @@ TEST(a_pulse_is_a_frame) {
   const unsigned pulses = native_sync_pulses();
   run_for(300);
   TEST_ASSERT_EQUAL_UINT(pulses, native_sync_pulses());
-  TEST_ASSERT_FALSE(native_sync_level());
 }
 
 TEST(it_is_off_while_the_bus_sleeps) {
@@ -116,9 +115,9 @@ TEST(it_is_off_while_the_bus_sleeps) {
   native_cdc_suspend(true);
   run_for(200);
   TEST_ASSERT_EQUAL(PORT_SYNC_OFF, native_sync_mode());
-  const uint64_t events = native_event_count();
+  const unsigned events = rig_events;
   run_for(1000);
-  TEST_ASSERT_LESS_THAN_UINT64(events + 200, native_event_count());
+  TEST_ASSERT_LESS_THAN_UINT(events + 200, rig_events);
   native_cdc_suspend(false);
   run_for(200);
   TEST_ASSERT_EQUAL(PORT_SYNC_SECOND, native_sync_mode());
