@@ -99,7 +99,7 @@ void GripFinger::begin_zero() {
   zero_x_N_ = zero_y_N_ = sum_x_N_ = sum_y_N_ = 0.0;
   sum_x_mm_ = sum_y_mm_ = 0.0;
   sums_ = places_ = 0;
-  has_zero_place_ = false;
+  has_zero_place_ = is_zeroed_ = false;
 }
 
 void GripFinger::end_zero() {
@@ -112,6 +112,7 @@ void GripFinger::end_zero() {
     zero_y_mm_ = sum_y_mm_ / places_;
   }
   has_zero_place_ = places_ > 0;
+  is_zeroed_ = true;
 }
 
 bool GripFinger::has_zero() const { return !has_load() || sums_ >= ZERO_FRAMES; }
@@ -154,7 +155,7 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
     reading.speed_mm_s = std::hypot(touch_.speed_x_mm_s, touch_.speed_y_mm_s);
     recoils = reading.load_N > SHARED_N && touch_.speed_x_mm_s * reading.load_x_N + touch_.speed_y_mm_s * reading.load_y_N < 0.0;
   }
-  reading.has_place = reading.contact && touch_.t_s < place_t_s_ + settings.stale_s;
+  reading.has_place = reading.contact && touch_.t_s < place_t_s_ + settings.stale_s && (has_zero_place_ || !is_zeroed_);
   reading.pulled = reading.has_place ? pulled_ : 0.0;
   // Eq. (7) mistakes a tangential force for a slide, so it counts only if there is no other evidence, and no friction
   // explains how far the contact has moved.
@@ -169,21 +170,18 @@ void GripFinger::believe(const GripReading &reading) {
   is_doubted_ = false;
 }
 
-bool GripFinger::mark() {
+bool GripFinger::mark(double least_N) {
   mark_x_N_ = believed_.load_x_N, mark_y_N_ = believed_.load_y_N;
-  return is_marked_ = believed_.has_load;
+  return is_marked_ = believed_.has_load && believed_.load_N >= least_N;
 }
 
 double GripFinger::keeps(const GripReading &reading) const {
   const double square = mark_x_N_ * mark_x_N_ + mark_y_N_ * mark_y_N_;
   const double along = mark_x_N_ * reading.load_x_N + mark_y_N_ * reading.load_y_N;
-  return !is_marked_ ? 0.0 : reading.has_load && square > 0.0 ? along / square : 1.0;
+  return reading.has_load && square > 0.0 ? along / square : 1.0;
 }
 
 double GripFinger::pull_N(const GripReading &reading) const {
-  if (!is_marked_) {
-    return std::numeric_limits<double>::max();
-  }
   return reading.has_load ? std::hypot(reading.load_x_N - mark_x_N_, reading.load_y_N - mark_y_N_) : 0.0;
 }
 
@@ -250,7 +248,7 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   GripReadings all;
   all.low_N = all.t_s = std::numeric_limits<double>::infinity();
   double loads_N = 0.0, most_N = 0.0, normal_N = 0.0, most_pull_N = 0.0, least_pull_N = all.low_N;
-  int loads = 0;
+  int loads = 0, marked = 0;
   all.speed_mm_s = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < fingers.size(); i++) {
     const GripReading &reading = readings[i];
@@ -259,8 +257,11 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
     all.over = all.over || reading.over;
     all.touches += reading.contact;
     all.slides = all.slides || reading.slides;
-    all.keeps = std::max(all.keeps, fingers[i].keeps(reading));
-    all.pull_N = i == 0 ? fingers[i].pull_N(reading) : std::min(all.pull_N, fingers[i].pull_N(reading));
+    if (fingers[i].is_marked(reading)) {
+      all.keeps = marked == 0 ? fingers[i].keeps(reading) : std::max(all.keeps, fingers[i].keeps(reading));
+      all.pull_N = marked == 0 ? fingers[i].pull_N(reading) : std::min(all.pull_N, fingers[i].pull_N(reading));
+      marked++;
+    }
     all.delay_s = std::max(all.delay_s, reading.counts ? fingers[i].delay_s() : 0.0);
     all.trouble |= reading.is_left_out ? GRIP_FINGERS_DIFFER : 0u;
     all.force_N[i] = reading.has_force || reading.is_left_out ? reading.force_N : 0.0;

@@ -58,8 +58,9 @@ public:
   void doubt(const GripReading &reading);
   double doubted_for_s(const GripReading &reading) const; // since the first frame that was doubted
 
-  // keeps and pull_N are of this load from now on. Without one, which is the answer, this fingertip has no say.
-  bool mark();
+  // keeps and pull_N are of the present load from now on. False: it is smaller than this. is_marked: it was not, and frames come.
+  bool mark(double least_N);
+  bool is_marked(const GripReading &reading) const { return is_marked_ && reading.counts; }
   // Share of the marked load that this one has, along it, and how far it is from it. Without a load now: all, and 0.
   double keeps(const GripReading &reading) const;
   double pull_N(const GripReading &reading) const;
@@ -84,7 +85,7 @@ private:
   double zero_x_N_ = 0.0, zero_y_N_ = 0.0, sum_x_N_ = 0.0, sum_y_N_ = 0.0;
   double place_t_s_ = -1.0, pulled_ = 0.0;
   double zero_x_mm_ = 0.0, zero_y_mm_ = 0.0, sum_x_mm_ = 0.0, sum_y_mm_ = 0.0;
-  bool has_zero_place_ = false;
+  bool has_zero_place_ = false, is_zeroed_ = false; // the latter: end_zero since begin_zero
   int sums_ = 0, places_ = 0;
 };
 
@@ -99,7 +100,7 @@ struct GripReadings {
   bool fresh = false, over = false, has_load = false, slides = false;
   double load_N = 0.0; // tangential force at one fingertip, less its zero
   double load_sd_N = 0.0;
-  double keeps = 0.0, pull_N = 0.0; // GripFinger::mark: the most and the least of the marked fingertips
+  double keeps = 1.0, pull_N = 0.0; // GripFinger::mark: the most and the least of the marked fingertips; of none: all, and 0
   bool has_place = true;            // of all that have contact
   double place_N = 0.0;             // tangential force by GripReading::pulled
   double ratio = 0.0;               // tangential over normal force, of the fingertips that have both

@@ -12,6 +12,7 @@ constexpr double RAMP_s = 0.1;
 constexpr double SQUEEZE_s = 3.0; // squeezing ends after this time with the force that it reached
 constexpr double SQUEEZED = 0.8;  // share of the start force that is enough
 constexpr double TAKEN = 0.2;     // share of the load that a table has left: it is placed
+constexpr double PLACES_N = 0.1;  // a fingertip with less load than this is no evidence of a table
 constexpr double BELOW_CAP = 0.9; // of a cap that was lowered below the force: where to open to
 constexpr double HALF = 0.5;      // a smaller share is no grip
 constexpr double ACTIVATION_s = 10.0;
@@ -63,6 +64,11 @@ bool Grip::is_grasping() const {
          state_ == GRIP_HANDING || (state_ == GRIP_STILL && still_grasps_);
 }
 
+bool Grip::mark(double least_N) {
+  const bool left = fingers_[0].mark(least_N), right = fingers_[1].mark(least_N);
+  return left || right;
+}
+
 bool Grip::request(GripRequest request) {
   switch (request) {
   case GRIP_REQUEST_GRASP:
@@ -71,6 +77,9 @@ bool Grip::request(GripRequest request) {
     }
     hold_.begin();
     fixed_.begin();
+    for (GripFinger &finger : fingers_) {
+      finger.begin_zero();
+    }
     holds_ = GRIP_HOLDING;
     wanted_N_ = 0.0;
     may_activate_ = is_blind_ = was_held_ = false;
@@ -93,7 +102,7 @@ bool Grip::request(GripRequest request) {
   case GRIP_REQUEST_PLACE:
   case GRIP_REQUEST_HAND_OVER:
     if (state_ != GRIP_HOLDING || settings_.mode == GRIP_MODE_FIXED || !readings_.has_load ||
-        (request == GRIP_REQUEST_PLACE && !hold_.is_loaded()) || !(fingers_[0].mark() | fingers_[1].mark())) {
+        (request == GRIP_REQUEST_PLACE && !hold_.is_loaded()) || !mark(request == GRIP_REQUEST_PLACE ? PLACES_N : 0.0)) {
       return false;
     }
     marked_N_ = readings_.load_N;
@@ -277,7 +286,8 @@ std::uint32_t Grip::hold() {
   if (reach_.is_in_detour()) {
     reach_.continue_detour(now_s_, readings_.t_s);
   } else if (!only_held || !reach_.start_detour_to(settings_.start_N, readings_, settings_, now_s_)) {
-    trouble |= aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual, hold_.is_set()});
+    const bool opens = readings_.has_load || hold_.is_set() || readings_.high_N > settings_.cap_N;
+    trouble |= aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual, hold_.is_set(), opens});
   }
   if (slides != (state_ == GRIP_SLIPPING)) {
     enter(slides ? GRIP_SLIPPING : holds_);

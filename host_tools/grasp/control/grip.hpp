@@ -69,6 +69,7 @@ private:
   std::uint32_t squeeze();
   std::uint32_t make_ready();
   std::uint32_t hold();
+  bool mark(double least_N);
   bool is_taken();
   std::uint32_t aim(const GripAim &aim);
   void ramp(double to_mm, double speed_mm_s);

@@ -145,16 +145,16 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
   need = std::min(need, settings.cap_N);
   is_set_ = settings.sets_force() && need == least_N && !is_loaded() && slides_ == 0;
   // A force that was wanted and is not under way is given up: the load that it was for has not come.
-  if ((readings.has_load || readings.has_place) && !goes_on_) {
-    wanted_N_ = std::min(wanted_N_, coming_N);
-  }
   if (readings.has_load && !goes_on_) {
+    wanted_N_ = std::min(wanted_N_, coming_N);
     // The present grip decays slowly.
     const bool rests = !readings.slides && (slides_ == 0 || now_s - slid_s_ > settings.rest_s);
     const double share = rests ? 1.0 - std::exp(-settings.decay_1_s * passed_s) : 0.0;
     wanted_N_ -= share * std::max(wanted_N_ - need, 0.0);
   }
-  wanted_N_ = std::max(wanted_N_, need);
+  // By the place alone nothing opens the gripper, so what was wanted before does not count.
+  const bool by_place = readings.has_place && !readings.has_load && !has_seen_load_;
+  wanted_N_ = by_place ? need : std::max(wanted_N_, need);
   return wanted_N_;
 }
 

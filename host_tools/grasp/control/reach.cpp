@@ -190,7 +190,9 @@ double GripReach::coming_mm(double now_s) const {
 
 double GripReach::least_mm() const { return traits_.step_mm * std::max(1.0, std::ceil(traits_.deadband_mm / traits_.step_mm - 1e-9)); }
 
-bool GripReach::limits_itself(const GripSettings &settings) const { return traits_.force_min_N <= LIMIT * settings.cap_N; }
+bool GripReach::limits_itself(const GripSettings &settings) const {
+  return traits_.force_max_N > 0.0 && traits_.force_min_N <= LIMIT * settings.cap_N;
+}
 
 double GripReach::least_move_N(double force_N) const { return rubber_.force_at(target_mm_ - least_mm(), force_N, target_mm_) - force_N; }
 
@@ -399,7 +401,7 @@ std::uint32_t GripReach::aim(const GripAim &aim, const GripReadings &readings, c
   }
   const Outlook outlook = predict(aim, readings, now_s);
   const bool closes = aim.nearest ? outlook.nearest_steps > 0.0 : outlook.coming_N < aim.wanted_N - outlook.misses_N;
-  const bool opens = !closes && !patient && outlook.come && outlook.coming_N - aim.wanted_N > outlook.near_N;
+  const bool opens = aim.opens && !closes && !patient && outlook.come && outlook.coming_N - aim.wanted_N > outlook.near_N;
   double to_mm = outlook.coming_mm;
   if (closes) {
     to_mm = closed_mm(outlook, aim, readings, settings, trouble);

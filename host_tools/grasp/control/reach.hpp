@@ -68,6 +68,7 @@ struct GripAim {
   double wanted_N; // force of a fingertip
   Haste haste;
   bool nearest = false; // true: a set force, as near as moves come. false: at least the wanted force
+  bool opens = true;    // false: only closes
 };
 
 class GripReach {

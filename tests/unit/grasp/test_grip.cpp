@@ -292,6 +292,28 @@ TEST(Grip, OpensByWhatEveryFingertipThatHadALoadReports) {
   }
 }
 
+// One whose frames do not come is none either, and one without a load worth the name never had it. Without any, nothing opens.
+TEST(Grip, PlacesAndHandsOverWithoutAFingertipThatIsMuteOrHasHardlyALoad) {
+  for (const double to_N : {0.0, 3.2}) {
+    for (const int mutes : {0, 1, 2}) {
+      GripWorld world;
+      world.load_share[1] = mutes == 0 ? 0.04 : 1.0;
+      world.grasp();
+      world.pull(2.0, 0.3);
+      world.run(2.0);
+      ASSERT_TRUE(world.grip.request(to_N > 2.0 ? GRIP_REQUEST_HAND_OVER : GRIP_REQUEST_PLACE));
+      world.mute = {mutes == 2, mutes > 0};
+      world.run(0.2);
+      world.load_share[1] = mutes == 0 ? 0.0 : 1.0;
+      world.drop_flags[1] = mutes == 0 && to_N == 0.0 ? std::uint32_t{CONTACT_FLAG_TANGENTIAL_VALID} : 0u;
+      world.pull(to_N, 0.2);
+      world.run(0.3);
+      const bool waits = mutes == 2 || (mutes == 0 && to_N > 2.0);
+      EXPECT_EQ(world.report.state, !waits ? GRIP_RELEASE : to_N > 2.0 ? GRIP_HANDING : GRIP_PLACING) << mutes << " " << to_N;
+    }
+  }
+}
+
 TEST(Grip, HandsOverWhatIsGone) {
   GripWorld world;
   world.grasp();

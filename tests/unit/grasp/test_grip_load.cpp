@@ -253,3 +253,43 @@ TEST(Grip, APlaceBeyondFrictionSlides) {
     EXPECT_EQ(world.report.state, ratio > world.settings.friction ? GRIP_SLIPPING : GRIP_HOLDING) << ratio;
   }
 }
+
+// Nothing but a load opens the gripper: neither noise nor the end of a slide.
+TEST(Grip, WithoutALoadItOnlyCloses) {
+  for (const bool has_place : {true, false}) {
+    GripWorld world;
+    world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
+    world.add_flags = {has_place ? 0u : std::uint32_t{CONTACT_FLAG_FLAT}, has_place ? 0u : std::uint32_t{CONTACT_FLAG_FLAT}};
+    world.grasp();
+    const double before_N = world.force_N;
+    for (int i = 0; i < 2000; i++) {
+      world.gain = {1.0 + 0.05 * std::sin(0.7 * i), 1.0 + 0.05 * std::sin(0.4 * i)};
+      world.run(1e-3);
+      ASSERT_GT(world.force_N, 0.97 * before_N) << i;
+    }
+    EXPECT_LT(world.force_N, 1.3 * before_N);
+    world.moved_mm = {4.0, 4.0};
+    world.add_flags[0] = world.add_flags[1] |= CONTACT_FLAG_SLIP;
+    world.run(0.03);
+    world.add_flags[0] = world.add_flags[1] &= ~std::uint32_t{CONTACT_FLAG_SLIP};
+    const double caught_N = world.force_N;
+    EXPECT_GT(caught_N, 1.1 * before_N);
+    world.moved_mm = {0.0, 0.0};
+    world.run(2.0);
+    EXPECT_GT(world.force_N, 0.98 * std::min(caught_N, 0.9 * world.settings.cap_N));
+    EXPECT_TRUE(!has_place || world.report.wanted_N < before_N); // nor does it go on closing for a load that has gone
+  }
+}
+
+// A place that was not there while the zero was taken shows no load.
+TEST(Grip, APlaceWithoutAZeroIsNone) {
+  GripWorld world;
+  world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
+  ASSERT_TRUE(world.grip.request(GRIP_REQUEST_GRASP));
+  world.run_to(GRIP_READY);
+  world.add_flags[1] = CONTACT_FLAG_FLAT;
+  world.run_to(GRIP_HOLDING);
+  world.add_flags[1] = 0;
+  world.run(1.0);
+  EXPECT_GT(world.force_N, 0.97 * world.settings.blind_N);
+}

@@ -99,16 +99,20 @@ TEST(Grip, NeverTightensASaturatedFingertipNorWithoutFrames) {
 
 // A slide does not hurry a gripper that cannot keep the cap itself: each move shows before the next.
 TEST(Grip, ASlideNeverLeadsBeyondALowCap) {
-  for (const double stiffness : {2.0, 2.5}) {
-    GripWorld world({{"cap", 4.0}, {"start", 0.6}, {"floor", 0.5}}, gripper_traits("2f85"));
-    world.stiffness = stiffness;
-    world.power = 1.85;
-    world.delay_s = 0.04;
-    world.grasp();
-    world.pull(0.4, 0.1);
-    world.slide(0.6, 30.0, 0.5);
-    world.run(0.3);
-    EXPECT_LT(world.peak_N, 4.0) << stiffness;
+  GripperTraits limitless = test::fine_gripper();
+  limitless.force_min_N = limitless.force_max_N = 0.0;
+  for (const GripperTraits &gripper : {gripper_traits("2f85"), limitless}) {
+    for (const double stiffness : {2.0, 2.5}) {
+      GripWorld world({{"cap", 4.0}, {"start", 0.6}, {"floor", 0.5}}, gripper);
+      world.stiffness = stiffness;
+      world.power = 1.85;
+      world.delay_s = 0.04;
+      world.grasp();
+      world.pull(0.4, 0.1);
+      world.slide(0.6, 30.0, 0.5);
+      world.run(0.3);
+      EXPECT_LT(world.peak_N, 4.0) << stiffness;
+    }
   }
 }
 
