@@ -9,6 +9,8 @@
 
   .equ SCB_VTOR, 0xe000ed08
   .equ MPU_CTRL, 0xe000ed94
+  .equ PSM_FRCE_OFF, 0x40010004
+  .equ PSM_PROC1, 1 << 16
   .equ STACK_PAINT, 0x5aa5c33c /* port.c counts it */
 
   .section .boot_vectors, "a"
@@ -30,6 +32,12 @@ boot_reset:
   str r1, [r0]
   dsb
   isb
+
+  ldr r0, =PSM_FRCE_OFF /* and the second processor may run, in what is copied over below */
+  ldr r2, =PSM_PROC1
+  str r2, [r0]
+  ldr r2, [r0] /* so that it is in force (pico-sdk, multicore_reset_core1) */
+  str r1, [r0]
 
   ldr r0, =__stack_limit
   mov r1, sp

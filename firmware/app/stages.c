@@ -186,7 +186,21 @@ void stages_on_event(const struct stages *stages, const struct scan *scan) {
 #endif
 }
 
+/* Before what the jobs read changes, or the chip sleeps. */
+static void forget_jobs(struct stages *stages) {
+#if FT_WITH_TANGENTIAL
+  jobs_cancel(&stages->jobs);
+  tangential_stage_forget(&stages->tangential);
+#endif
+#if FT_WITH_SHAPES
+  shapes_stage_forget(&stages->shapes);
+#endif
+}
+
 void stages_pause(struct stages *stages, bool paused) {
+  if (paused) {
+    forget_jobs(stages);
+  }
 #if FT_WITH_SYNC
   sync_pause(&stages->sync, paused);
 #endif
@@ -197,17 +211,6 @@ bool stages_need_fast_rounds(const struct stages *stages) {
   return sync_is_stamping(&stages->sync);
 #else
   return false;
-#endif
-}
-
-/* Before what the jobs read changes. */
-static void forget_jobs(struct stages *stages) {
-#if FT_WITH_TANGENTIAL
-  jobs_cancel(&stages->jobs);
-  tangential_stage_forget(&stages->tangential);
-#endif
-#if FT_WITH_SHAPES
-  shapes_stage_forget(&stages->shapes);
 #endif
 }
 

@@ -102,6 +102,18 @@ test('what a debugger left in the clock generators does not stay', () => {
   assert.equal(bench.end().reboots, 0);
 });
 
+test('a reset of the first core alone ends the second before its code is copied over', () => {
+  const bench = new Bench('pico_mux');
+  const { chip } = bench.machine;
+  bench.until(() => chip.second.state === 'runs', 50, 'second core');
+  chip.sram.set(chip.flash.subarray(0, 256), 0x41f00); // as the boot ROM does
+  chip.core.registers.fill(0);
+  chip.core.registers[13] = chip.core.registers[15] = 0x20041f00;
+  chip.core.waiting = false;
+  bench.run(0.03);
+  assert.equal(chip.second.state, 'pen');
+});
+
 for (const name of BOARDS) {
   test(`${name}: the start of a frame is seen at once, whatever the sensors need`, (t) => {
     const faults = [{ type: 'sensor_dead', sensor: 3, from_s: 0.2, to_s: 0.25 }];

@@ -156,21 +156,6 @@ TEST(test_single_nacks_cost_the_frames_they_touch) {
   }
 }
 
-/* Three in a row cost the admission, and it comes back at once. */
-TEST(test_silence_for_three_readings_leads_to_a_reset) {
-  run_until(1000000);
-  fake.answering = ALL & ~DISTURBED_BIT;
-  skip_frames(2);
-  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
-  next_frame();
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.admitted));
-  fake.answering = ALL;
-  skip_frames(2);
-  next_frame();
-  assert_good_frame(ALL);
-  TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
-}
-
 /* It acknowledged the command and has nothing to tell: its supply has failed. */
 TEST(test_zero_after_an_acknowledged_command_leads_to_a_reset) {
   bus.answers_are_single = true;
