@@ -5,10 +5,11 @@ import contextlib
 import json
 import math
 import os
+import re
 import sys
 
 from .errors import FingertipError, InputError
-from .files import SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm, check_output, printable, write_text
+from .files import SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm, check_output, printable, read_lines, write_text
 from .validation.assess import Card
 from .validation.card import card_html, card_json
 from .validation.live import validate_live
@@ -73,6 +74,7 @@ def _parser():
     add("--from", dest="recording", metavar="FILE.csv", help=f"Make the card from a recording that validate kept (not with {excluded})")
     add("-o", "--output", metavar="CARD.html", help="The card, a page with pictures")
     add("--figures", metavar="FILE.json", help="The card's figures, for programs")
+    add("--form", metavar="FILE.md", help="A form of your measurements, whose {keys} of --figures are replaced by the card's figures")
     add("--overwrite", action="store_true", help="Replace files that exist")
     add("--colour", metavar="MODE", choices=colours, default="auto", help="auto, truecolour, 256, or plain: a line a second")
     return parser
@@ -142,6 +144,7 @@ def run(argv):
     for path in (options.template, options.output, options.figures, options.record):
         if path:
             _check_output(path, options.overwrite)
+    form = "\n".join(read_lines(options.form)) + "\n" if options.form else ""
     if options.template:
         array = array_of(SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm)
         draw = template_pdf if options.template.lower().endswith(".pdf") else template_svg
@@ -154,6 +157,9 @@ def run(argv):
         write_text(options.output, card_html(card, __version__))
     if options.figures:
         write_text(options.figures, json.dumps(card_json(card), indent=1) + "\n")
+    if options.form:
+        known = {figure.key: figure.shown(figure.value) for figure in card.figures}
+        write_text(options.form, re.sub(r"\{(\w+)\}", lambda key: known.get(key[1], "not measured"), form))
     _print(card)
 
 

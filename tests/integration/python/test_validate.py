@@ -11,6 +11,7 @@ import math
 import os
 import pathlib
 import re
+import shutil
 import signal
 import socket
 import statistics
@@ -508,6 +509,10 @@ class Live(ValidateTest):
         self.assertEqual(self.read(self.card), live)
         self.assertNotIn(SERIAL, live)
         self.assertLess(figures["figures"]["hand_mm"], 0.5)
+        form = pathlib.Path(shutil.copy(ROOT / "boards/first_measurements.md", self.folder))
+        self.run_validate("--from", self.csv, "-o", self.card, "--overwrite", "--form", str(form))
+        self.assertIn(f"| noise of a reading | {figures['figures']['noise_Pa']:.1f} Pa |", self.read(form))
+        self.assertNotRegex(self.read(form), r"not measured|\{\w+\}")
 
 
 if __name__ == "__main__":
