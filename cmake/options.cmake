@@ -10,14 +10,6 @@ if(NOT FINGERTIP_BOARD STREQUAL "native" AND NOT CMAKE_CROSSCOMPILING)
   message(FATAL_ERROR "Board ${FINGERTIP_BOARD} needs the cross compiler: use -DCMAKE_TOOLCHAIN_FILE=cmake/toolchain-arm-none-eabi.cmake")
 endif()
 
-# The sensors of the array, all of one kind: a section of firmware/ms58xx/sensors.h.
-set(FINGERTIP_SENSORS ms5840 ms5837_30ba)
-set(FINGERTIP_SENSOR ms5840 CACHE STRING "Sensor: one of ${FINGERTIP_SENSORS}")
-set_property(CACHE FINGERTIP_SENSOR PROPERTY STRINGS ${FINGERTIP_SENSORS})
-if(NOT FINGERTIP_SENSOR IN_LIST FINGERTIP_SENSORS)
-  message(FATAL_ERROR "FINGERTIP_SENSOR=${FINGERTIP_SENSOR} is unknown; choose one of: ${FINGERTIP_SENSORS}")
-endif()
-
 # A scene is a named set of capabilities and defaults for one use of the fingertip.
 #   raw     pressures and tare only
 #   press   location and force, in the least flash

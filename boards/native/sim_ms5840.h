@@ -1,4 +1,4 @@
-/* One simulated MS5840-02BA, or MS5837-30BA by FINGERTIP_SENSOR, as seen from its two wires: what it acknowledges, answers and forgets, and
+/* One simulated MS5840-02BA, or MS5837-30BA by the pad, as seen from its two wires: what it acknowledges, answers and forgets, and
  * when. Written from the datasheet, apart from the driver in firmware/ms58xx, so that the two can be tested against each other.
  *
  * Behaviour: after power-up nothing but the reset command works; it takes 2.8 ms, during which the sensor acknowledges

@@ -1,5 +1,5 @@
-/* The sensors of the MS58xx family: one section each. The build chooses one (FINGERTIP_SENSOR in
- * cmake/options.cmake), so that an image holds nothing of the others.
+/* The sensors of the MS58xx family: one section each. The build chooses that of the pad
+ * (boards/pads/README.md), so that an image holds nothing of the others.
  *
  * All of them have the same commands and the same PROM (W0: CRC-4 in its top four bits, then the product type; W1..W6:
  * C1..C6). All have the same temperature, 2000 + dT * C6 / 2^23. They differ in:
@@ -18,7 +18,7 @@
  *   OSR_TABLE         ratio, its bits in the convert commands, longest conversion in us, noise of a
  *                     pressure in Pa rms and of a temperature in degC rms
  *
- * To add a sensor, add a section here, its name in cmake/options.cmake, and its data in boards/native/sim_ms5840.c and
+ * To add a sensor, add a section here, its name in firmware/CMakeLists.txt, and its data in boards/native/sim_ms5840.c and
  * in the emulator's board/ms5840.mjs. If its CRC is elsewhere (MS5611: in an eighth word), change ms58xx_prom_crc4 too. */
 #pragma once
 
@@ -72,5 +72,5 @@
       ROW(2048, 0x6, 4540, 38.0f, 0.004f), ROW(4096, 0x8, 9040, 28.0f, 0.003f), ROW(8192, 0xA, 18080, 20.0f, 0.002f)
 
 #else
-#error "MS58XX_SENSOR must be one of the sensors above; FINGERTIP_SENSOR sets it"
+#error "MS58XX_SENSOR must be one of the sensors above; the pad's file sets it"
 #endif

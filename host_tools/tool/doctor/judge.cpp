@@ -252,7 +252,7 @@ private:
     if (facts_.rest && are_of_another_type()) {
       add(Verdict::bad, "sensors",
           "they read " + fixed(middle_Pa() / 1000, 0) + " kPa at rest, as sensors do that are not those of the firmware",
-          "install firmware that was built for them (cmake -DFINGERTIP_SENSOR=...), or the sensors that this one is "
+          "install firmware that was built for them (cmake -DFINGERTIP_PAD=FILE.json), or the sensors that this one is "
           "for");
     } else if (facts_.rest) {
       for (unsigned k = 0; k < facts_.rest->sensors.size(); k++) {
