@@ -8,9 +8,7 @@ from sheet import number
 
 THICK_mm = 1.6
 MIDDLE_mm = 100  # of the pad, on KiCad's sheet
-HEAD_mm, SCREW_FREE_mm = 3.2, 3.4  # of an M3's nut across its corners, half; without tracks
-UNDER_PICO_mm = (-3.9, -25.1, 3.9, -11.3)  # from its middle: test points, and the solder of the USB socket (its data sheet, SMT footprint)
-UNDER_SENSOR_mm = (-1.95, -1.95, 1.95, 1.95)  # its courtyard
+HOLE_FREE_mm = 0.1  # around a hole, beside the clearance of tracks
 FONT = "(effects (font (size 0.7 0.7) (thickness 0.12))"
 LAYERS = (
     '(0 "F.Cu" signal) (31 "B.Cu" signal) (34 "B.Paste" user) (35 "F.Paste" user) (36 "B.SilkS" user) (37 "F.SilkS" user) (38 "B.Mask" user) '
@@ -22,41 +20,37 @@ def at(x, y):
     return f"{number(MIDDLE_mm + x)} {number(MIDDLE_mm + y)}"
 
 
-def zone(net, layer, fill, rectangle):
+def zone(net, layers, fill, rectangle):
     left, top, right, bottom = rectangle
     corners = "".join(f" (xy {at(x, y)})" for x, y in ((left, top), (right, top), (right, bottom), (left, bottom)))
-    return f'  (zone {net} (layer "{layer}.Cu") (hatch edge 0.5) (connect_pads (clearance 0.2)) (min_thickness 0.25) {fill} (polygon (pts{corners})))'
+    on = " ".join(f'"{side}.Cu"' for side in layers)
+    return (
+        f"  (zone {net} (layers {on}) (hatch edge 0.5) (connect_pads (clearance 0.2)) (min_thickness 0.25) {fill} (polygon (pts{corners})))"
+    )
 
 
 def footprint(part, numbers):
     land, side = part.land, "B" if part.back else "F"
     turn, mirror = f" {part.turn}" if part.turn else "", " (justify mirror)" if part.back else ""
-    yield f'  (footprint "{land.kicad}" (layer "{side}.Cu") (at {at(part.x, part.y)}{turn}) (attr smd)'
-    for kind, layer, y, words in (
-        ("reference", "Fab" if turn else "SilkS", -land.bottom - 0.6, part.name),
-        ("value", "Fab", 0, part.value),
-    ):
-        yield f'    (fp_text {kind} "{words}" (at 0 {number(y)}) (layer "{side}.{layer}") {FONT}{mirror}))'
+    kind = "smd" if part.value else "exclude_from_pos_files exclude_from_bom"
+    yield f'  (footprint "{land.kicad}" (layer "{side}.Cu") (at {at(part.x, part.y)}{turn}) (attr {kind})'
+    text = lambda kind, words, y, on: f'    (fp_text {kind} "{words}" (at 0 {number(y)}) (layer "{side}.{on}") {FONT}{mirror}))'
+    yield text("reference", part.name, -land.bottom - 0.6, "Fab" if turn or not land.pads else "SilkS")
+    yield text("value", part.value, 0, "Fab")
     corners = f"(start {number(-land.right)} {number(-land.bottom)}) (end {number(land.right)} {number(land.bottom)})"
-    yield f'    (fp_rect {corners} (layer "{side}.CrtYd") (width 0.05) (fill none))'
-    pads = [(name, x, -y if part.back else y, w, h) for name, x, y, w, h in land.pads]  # as KiCad flips a part
-    if len(pads) > 2:
-        _, x, y, w, _ = pads[0]
-        dot = f"(center {number(x - w / 2 - 0.35)} {number(y)}) (end {number(x - w / 2 - 0.25)} {number(y)})"
+    yield from (f'    (fp_rect {corners} (layer "{each}.CrtYd") (width 0.05) (fill none))' for each in (side if land.pads else "FB"))
+    flip = -1 if part.back else 1  # as KiCad flips a part
+    if len(land.pads) > 2:
+        _, x, y, w, _ = land.pads[0]
+        dot = f"(center {number(x - w / 2 - 0.35)} {number(flip * y)}) (end {number(x - w / 2 - 0.25)} {number(flip * y)})"
         yield f'    (fp_circle {dot} (layer "{side}.SilkS") (width 0.15) (fill none))'
-    for name, x, y, w, h in pads:
+    for name, x, y, w, h in land.pads:
         net = f' (net {numbers[part.nets[name]]} "{part.nets[name]}")' if name in part.nets else ""
-        place = f"(at {number(x)} {number(y)}{turn}) (size {number(w)} {number(h)})"
+        place = f"(at {number(x)} {number(flip * y)}{turn}) (size {number(w)} {number(h)})"
         yield f'    (pad "{name}" smd rect {place} (layers "{side}.Cu" "{side}.Paste" "{side}.Mask"){net})'
+    for x, y, hole in land.holes:
+        yield f'    (pad "" np_thru_hole circle (at {number(x)} {number(flip * y)}) (size {hole} {hole}) (drill {hole}) (layers "*.Cu" "*.Mask"))'
     yield "  )"
-
-
-def screw(i, x, y):
-    hole = f"(size {mould.SCREW_mm} {mould.SCREW_mm}) (drill {mould.SCREW_mm})"
-    yield f'  (footprint "fingertip:screw" (layer "F.Cu") (at {at(x, y)}) (attr exclude_from_pos_files exclude_from_bom)'
-    yield f'    (fp_text reference "H{i}" (at 0 0) (layer "F.Fab") hide {FONT}))'
-    yield from (f'    (fp_circle (center 0 0) (end {HEAD_mm} 0) (layer "{side}.CrtYd") (width 0.05) (fill none))' for side in "FB")
-    yield f'    (pad "" np_thru_hole circle (at 0 0) {hole} (layers "*.Cu" "*.Mask")))'
 
 
 def copper(numbers, laid):
@@ -72,8 +66,8 @@ def copper(numbers, laid):
 
 def board_text(board, sensors):
     """The .kicad_pcb."""
-    measures, parts = mould.measures(sensors), layout.parts(board, sensors)
-    x, y = (mm / 2 for mm in measures.outside)
+    outside, parts = mould.measures(sensors).outside, layout.parts(board, sensors)
+    x, y = (mm / 2 for mm in outside)
     numbers = {net: n + 1 for n, net in enumerate(sorted({net for part in parts for net in part.nets.values()}))}
     lines = [
         "(kicad_pcb (version 20211014) (generator fingertip)",
@@ -82,17 +76,15 @@ def board_text(board, sensors):
         *(f'  (net {n} "{net}")' for net, n in numbers.items()),
         f'  (gr_rect (start {at(-x, -y)}) (end {at(x, y)}) (layer "Edge.Cuts") (width 0.1) (fill none))',
         *(line for part in parts for line in footprint(part, numbers)),
-        *(line for i, (x, y) in enumerate(measures.screws) for line in screw(i, x, -y)),
     ]
     placed = pcb_check.Board("\n".join([*lines, ")"]))
-    around = lambda letter, box: [tuple(part[axis] + mm for axis, mm in zip((2, 3, 2, 3), box)) for part in parts if part.name[0] == letter]
-    under = around("A", UNDER_PICO_mm)
     pads = [(net, int(placed.parts[part][3]), *place) for (part, _), (*place, net) in placed.pads.items()]
-    screws = [(x, y, SCREW_FREE_mm) for x, y, _ in placed.holes]
-    lines += copper(numbers, route.route(measures.outside, pads, screws, around("U", UNDER_SENSOR_mm) + under, under))
-    x, y = (mm / 2 - route.EDGE_um / 1000 for mm in measures.outside)
+    free = [(sides, (part.x - x, part.y + top, part.x + x, part.y + bottom)) for part in parts for sides, x, top, bottom in part.land.free]
+    around = [("FB", (x - reach, y - reach, x + reach, y + reach)) for x, y, hole in placed.holes for reach in [hole / 2 + HOLE_FREE_mm]]
+    lines += copper(numbers, route.route(outside, pads, [(["FB".index(side) for side in sides], box) for sides, box in free + around]))
+    x, y = (mm / 2 - route.EDGE_um / 1000 for mm in outside)
     fill = "(fill yes (thermal_gap 0.3) (thermal_bridge_width 0.4) (island_removal_mode 0))"
-    lines += [zone(f'(net {numbers["GND"]}) (net_name "GND")', layer, fill, (-x, -y, x, y)) for layer in "FB"]
+    lines.append(zone(f'(net {numbers["GND"]}) (net_name "GND")', "FB", fill, (-x, -y, x, y)))
     none = "(keepout (tracks not_allowed) (vias not_allowed) (pads allowed) (copperpour not_allowed) (footprints allowed)) (fill)"
-    lines += [zone('(net 0) (net_name "")', "B", none, rectangle) for rectangle in under]
+    lines += [zone('(net 0) (net_name "")', sides, none, box) for sides, box in free if sides]
     return "\n".join([*lines, ")"]) + "\n"

@@ -7,8 +7,8 @@ draw.py --lay      lays circuit boards: seconds for each boards/<board>/pcb, int
 
 boards/<board>/wiring.svg                  from board.json
 boards/<board>/README.md, wiring and parts from board.json and parts.json
-boards/<board>/pcb/, picture, BOM, placement from the .kicad_pcb there and parts.json
-boards/placement.svg, boards/mould.svg     at 1:1, from boards/pads/3x5.json
+boards/<board>/pcb/, picture, BOM, plate   from the .kicad_pcb there and parts.json
+boards/mould.svg, mould_measures.scad      at 1:1, from boards/pads/3x5.json
 boards/BUILD.md, measures                  the same as a table
 """
 
@@ -23,7 +23,6 @@ import board_file
 import geometry
 import mould
 import pcb
-import placement
 import wiring
 
 COMMAND = "boards/drawing/draw.py"
@@ -83,7 +82,7 @@ def drawings(root):
     for path in sorted(boards.glob("*/pcb/*.kicad_pcb")):
         found |= pcb.files(path, parts, part_of)
     sensors = geometry.places(root)
-    found[boards / "placement.svg"] = placement.drawn(sensors)
+    found[boards / "mould_measures.scad"] = mould.scad(sensors)
     found[boards / "mould.svg"] = mould.drawn(sensors)
     page = boards / "BUILD.md"
     found[page] = filled(page.read_text(encoding="utf-8"), "measures", mould.table(sensors))

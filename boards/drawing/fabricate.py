@@ -6,6 +6,7 @@ fabricate.py FOLDER    writes FOLDER/<board>/ for each boards/<board>/pcb, and p
 Needs KiCad 6 (Debian: kicad, kicad-footprints). The same board gives the same bytes: dates and versions are left out.
 """
 
+import csv
 import json
 import pathlib
 import re
@@ -15,6 +16,7 @@ import tempfile
 import zipfile
 
 import pcbnew
+from sheet import number
 
 LAYERS = ("F_Cu", "B_Cu", "F_Mask", "B_Mask", "F_Paste", "B_Paste", "F_SilkS", "B_SilkS", "Edge_Cuts")
 DATED = re.compile(
@@ -39,8 +41,6 @@ def plotted(board, folder):
     options = plotter.GetPlotOptions()
     options.SetOutputDirectory(str(folder))
     options.SetUseAuxOrigin(True)
-    options.SetUseGerberX2format(True)
-    options.SetIncludeGerberNetlistInfo(True)
     for layer in LAYERS:
         plotter.SetLayer(getattr(pcbnew, layer))
         plotter.OpenPlotfile(layer, pcbnew.PLOT_FORMAT_GERBER, layer)
@@ -51,6 +51,16 @@ def plotted(board, folder):
     writer.SetFormat(True)  # metric; without it KiCad 6.0.11 writes hundredths
     writer.CreateDrillandMapFilesSet(str(folder), True, False)
     return {path.name: DATED.sub("", path.read_text(encoding="utf-8")) for path in sorted(pathlib.Path(folder).iterdir())}
+
+
+def placements(board):
+    """The placement file as many houses take it: places as in the Gerbers, parts turned counter-clockwise, seen from their side."""
+    own = pcbnew.PLACE_FILE_EXPORTER(board, True, False, False, True, True, True, True).GenPositionData()
+    rows = ["Designator,Mid X,Mid Y,Layer,Rotation"]
+    for name, _, _, x, y, turn, side in csv.reader(own.splitlines()[1:]):  # of the back, KiCad 6 has x as seen from there
+        x, turn = (-float(x), 180 - float(turn)) if side == "bottom" else (float(x), float(turn))
+        rows.append(f"{name},{number(x)}mm,{number(float(y))}mm,{side.title()},{turn % 360:g}")
+    return "\n".join(rows) + "\n"
 
 
 def main(argv):
@@ -65,6 +75,7 @@ def main(argv):
             board, found = judged(path, folder / "rule-check.txt")
             for name, text in plotted(board, scratch).items():
                 out.writestr(zipfile.ZipInfo(name), text)
+        (folder / f"{path.stem}-placement.csv").write_text(placements(board), encoding="utf-8")
         for file in (*path.parent.glob("*.csv"), *path.parent.glob("*.svg")):
             shutil.copy(file, folder)
         print(f"{folder}: {json.dumps(found)}")

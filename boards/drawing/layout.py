@@ -2,9 +2,7 @@
 
 Millimetres from the pad's middle, x to the right and y down, seen from the front (the sensors' y is up). What is higher than a sensor lies on the back.
 
-Lands with a name of KiCad 6.0.11's library have its figures. The sensor's is the MS5837's, whose pads are the MS5840's in two public boards
-(boards/BUILD.md); no data sheet of the MS5840 was open to us. The Pico's pads are those of Raspberry Pi's own KiCad library (copies at Iangitpers/4a
-and in ergogen): rows 17.78 mm apart, 3.5 x 1.7, 0.9 outwards; its outline is the data sheet's, 51 x 21 mm.
+Lands with a name of KiCad 6.0.11's library have its figures. boards/BUILD.md ("What to check first") has where sensor and Pico have theirs from.
 """
 
 import collections
@@ -16,11 +14,12 @@ import wiring
 BESIDE_mm, APART_mm = 3.4, 1.6  # capacitor and resistors of a sensor from its middle: to its sides, and from each other
 EDGE_mm, PULLS_mm, CONNECTOR_mm = 26, 5, 3.5  # the middles of Pico, resistors of the bus and connector from the board's edge
 MULTIPLEXER_mm = 8.5  # its middle from the outer sensors
+HEAD_mm = 3.2  # of an M3's nut across its corners, half
 CHANNELS = [(4, 5), (6, 7), (8, 9), (10, 11), (13, 14), (15, 16), (17, 18), (19, 20)]  # SD and SC of a TCA9548A
 
-Land = collections.namedtuple(
-    "Land", "kicad pads right bottom"
-)  # name; [(name, x, y, width, height)]; half the courtyard's width and height
+# name; [(name, x, y, width, height)]; half the courtyard's width and height; unplated [(x, y, diameter)]; [(layers, half a width, top, bottom)] that
+# stay without copper, layers: F, B, both, or none: only without vias
+Land = collections.namedtuple("Land", "kicad pads right bottom holes free", defaults=((), ()))
 # turn: degrees, counter-clockwise seen from the front; nets: {pad: net}
 Part = collections.namedtuple("Part", "name land x y turn back nets value")
 
@@ -31,13 +30,17 @@ def rows(count, x, pitch, width, height):
     return [(i + 1 if side < 0 else count - i, side * x, y, width, height) for side in (-1, 1) for i, y in of_row]
 
 
-SENSOR = Land("Sensor_Pressure:TE_MS5837-xxBA", rows(4, 1, 2, 1.3, 1.3), 1.95, 1.95)
+SENSOR = Land("Sensor_Pressure:TE_MS5837-xxBA", rows(4, 1, 2, 1.3, 1.3), 1.95, 1.95, (), [("", 1.95, -1.95, 1.95)])
 RESISTOR = Land("Resistor_SMD:R_0603_1608Metric", rows(2, 0.825, 0, 0.8, 0.95), 1.48, 0.73)
 CAPACITOR = Land("Capacitor_SMD:C_0603_1608Metric", rows(2, 0.775, 0, 0.9, 0.95), 1.48, 0.73)
 MULTIPLEXER = Land("Package_SO:TSSOP-24_4.4x7.8mm_P0.65mm", rows(24, 2.8625, 0.65, 1.475, 0.4), 3.85, 4.15)
 WIRES = [(n + 1, n - 3.5, -2, 0.6, 1.55) for n in range(8)] + [("MP", x, 1.875, 1.2, 1.8) for x in (-4.8, 4.8)]
 CONNECTOR = Land("Connector_JST:JST_SH_SM08B-SRSS-TB_1x08-1MP_P1.00mm_Horizontal", WIRES, 5.9, 3.28)
-PICO = Land("fingertip:pico", rows(40, 9.79, 2.54, 3.5, 1.7), 11.6, 26.9)
+# Holes for solder of the USB socket's legs; and no copper beside test points and SWD pads, of Pico and Pico W.
+LEGS = [(side * x, y, diameter) for x, y, diameter in ((2.725, -24, 2.2), (2.425, -20.97, 1.85)) for side in (-1, 1)]
+POINTS = [("B", 3.9, -25.3, -10), ("B", 2, -6, -4), ("B", 6.7, 4.7, 6.7), ("B", 3.6, 22.9, 26.6)]
+PICO = Land("fingertip:pico", rows(40, 9.79, 2.54, 3.5, 1.7), 11.6, 26.9, LEGS, POINTS)
+SCREW = Land("fingertip:screw", (), HEAD_mm, HEAD_mm, [(0, 0, mould.SCREW_mm)], [("FB", HEAD_mm, -HEAD_mm, HEAD_mm)])
 POINT = Land("fingertip:point", [(1, 0, 0, 1.5, 1.5)], 1, 1)
 
 
@@ -62,12 +65,12 @@ def parallel(board, sensors, edge):
     for k, (x, y) in enumerate(sensors):
         parts.sensor(x, -y, f"SDA{k}", "SCL")
         parts.resistor(x + BESIDE_mm, -y - APART_mm, 270, ohm["sda"], f"SDA{k}")
-    parts.resistor(0, edge + PULLS_mm, 0, ohm["scl"], "SCL")
+    parts.resistor(8, edge + PULLS_mm, 0, ohm["scl"], "SCL")
     nets = dict.fromkeys([*pico.grounds(), pico.pin("AGND")], "GND") | {pico.pin("3V3"): "3V3"}
     nets |= {pico.pin(f"GP{k}"): f"SDA{k}" for k in range(board.sensors)} | {pico.pin(f"GP{board.wiring['pin_scl']}"): "SCL"}
     if "pin_sync" in board.wiring:
         nets[pico.pin(f"GP{board.wiring['pin_sync']}")] = "SYNC"
-        parts.part("J", POINT, -16, edge + PULLS_mm, 0, True, {1: "SYNC"}, "sync")
+        parts.part("J", POINT, -16, edge + PULLS_mm, 0, True, {1: "SYNC"}, "")
     parts.part("A", PICO, 0, edge + EDGE_mm, 180, True, nets, "Raspberry Pi Pico")
     return parts
 
@@ -98,5 +101,8 @@ def multiplexed(board, sensors, edge):
 
 
 def parts(board, sensors):
-    edge = -mould.measures(sensors).outside[1] / 2
-    return (parallel if board.bus == "parallel" else multiplexed)(board, sensors, edge)
+    measures = mould.measures(sensors)
+    found = (parallel if board.bus == "parallel" else multiplexed)(board, sensors, -measures.outside[1] / 2)
+    for x, y in measures.screws:
+        found.part("H", SCREW, x, -y, 0, False, {}, "")
+    return found

@@ -1,9 +1,10 @@
-"""mould.svg and its table of measures: the base plate around the sensors, the skin's mould, and the frame that clamps the skin.
+"""mould.svg, mould_measures.scad and the table of measures: the base plate around the sensors, the skin's mould, and the frame that clamps the skin.
 
 All follows from the sensors' places and the choices below. None of it was made yet.
 """
 
 import dataclasses
+import json
 
 from geometry import PACKAGE_HIGH_mm, PACKAGE_mm
 from sheet import across, circle, cross, down, rectangle, ruler, sheet, text
@@ -56,27 +57,34 @@ def measures(sensors):
 def table(sensors):
     """Markdown."""
     m = measures(sensors)
-    size = "{:g} x {:g} mm".format
+    size = lambda each, more=0: f"{each[0] + more:g} x {each[1] + more:g} mm"
+    (x, y), hollow = m.screws[-1], f"face down, in a block of {size(m.flange, 2 * WALL_mm)}, {RUBBER_mm + WALL_mm:g} mm high, open above"
     rows = [
-        ("base plate", f"{size(*m.outside)}, {PACKAGE_HIGH_mm:g} mm thick; a square hole of {m.hole_mm:g} mm for each sensor"),
-        ("rubber that is touched", f"{size(*m.skin)}, {RUBBER_mm:g} mm thick: {OVERHANG_mm:g} mm beyond the outer sensors"),
-        ("its flange", f"{size(*m.flange)}, {FLANGE_HIGH_mm:g} mm thick, at the sensors"),
-        (
-            "mould of the skin",
-            f"the same hollow, face down, in a block of {size(*(mm + 2 * WALL_mm for mm in m.flange))}, {RUBBER_mm + WALL_mm:g} mm high, open above",
-        ),
+        ("base plate", f"{size(m.outside)}, {PACKAGE_HIGH_mm:g} mm thick; a square hole of {m.hole_mm:g} mm for each sensor"),
+        ("rubber that is touched", f"{size(m.skin)}, {RUBBER_mm:g} mm thick: {OVERHANG_mm:g} mm beyond the outer sensors"),
+        ("its flange", f"{size(m.flange)}, {FLANGE_HIGH_mm:g} mm thick, at the sensors"),
+        ("mould of the skin", f"the same hollow, {hollow}"),
         ("rubber in it", f"{m.volume_ml:.0f} ml"),
         (
             "frame",
-            f"{size(*m.outside)}; its ring around the flange {m.ring_mm:g} mm high, its lid {LID_mm:g} mm with an opening of {size(*m.opening)}",
+            f"{size(m.outside)}; a ring {m.ring_mm:g} mm high around the flange, a lid of {LID_mm:g} mm that leaves {size(m.opening)} open",
         ),
-        (
-            "screws",
-            f"{len(m.screws)} M3, {2 * m.screws[-1][0]:g} mm apart across and {m.screws[-1][1]:g} mm along; holes of {SCREW_mm:g} mm",
-        ),
-        ("walls to cast on", f"inside {size(*m.skin)}, {RUBBER_mm:g} mm high, on the base plate"),
+        ("screws", f"{len(m.screws)} M3, {2 * x:g} mm apart across and {y:g} mm along; holes of {SCREW_mm:g} mm"),
+        ("walls to cast on", f"{size(m.outside)}, {RUBBER_mm:g} mm high, inside {size(m.skin)}; on the base plate"),
     ]
     return "\n".join(["| part | measures |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows)]) + "\n"
+
+
+def scad(sensors):
+    """Variables of mould.scad."""
+    values = dataclasses.asdict(measures(sensors)) | {
+        "sensors": sensors,
+        "screw_mm": SCREW_mm,
+        "plate_mm": PACKAGE_HIGH_mm,
+        "lid_mm": LID_mm,
+    }
+    values |= {"play_mm": FRAME_PLAY_mm, "wall_mm": WALL_mm, "rubber_mm": RUBBER_mm, "flange_mm": FLANGE_HIGH_mm}
+    return "".join(["// Written by boards/drawing/draw.py.\n", *(f"{name} = {json.dumps(value)};\n" for name, value in values.items())])
 
 
 def plate(x, y, m, sensors):

@@ -1,4 +1,4 @@
-"""What follows from a circuit board's KiCad file: its picture, the list of parts to order, and the placement file. For draw.py."""
+"""What follows from a circuit board's KiCad file: its picture, the list of parts to order, and its base plate. For draw.py."""
 
 import json
 
@@ -21,34 +21,21 @@ def bom(board, listed, part_of):
     return "\n".join(["Comment,Maker,Order number,Designator", *(f'{row},"{",".join(names)}"' for row, names in found.items())]) + "\n"
 
 
-def placement(board):
-    """From the board's middle, y up; turned counter-clockwise, seen from the part's side."""
-    rows = ["Designator,Mid X,Mid Y,Layer,Rotation"]
-    for name, (x, y, turn, back, _) in board.parts.items():
-        if name[0] in "UCRMXA":
-            side = f"Bottom,{(180 - turn) % 360}" if back else f"Top,{turn}"
-            rows.append(f"{name},{sheet.number(x)}mm,{sheet.number(-y)}mm,{side}")
-    return "\n".join(rows) + "\n"
-
-
-def plate(board, middle):
-    """The base plate that the board needs, from below: a hole for each sensor, and a pocket for what else is on the front."""
-    (left, top), (right, bottom) = board.outline
-    words = f"base plate, from below: holes {HOLE_mm}, pockets {POCKET_mm} deep"
-    lines = [sheet.rectangle(middle, 0, right - left, bottom - top), sheet.text(middle + left, top - 2, words)]
-    lines += [sheet.circle(middle - x, y, diameter) for x, y, diameter in board.holes]
+def plate(board):
+    """The base plate that the board needs, for OpenSCAD: a hole for each sensor, and from below a pocket for what else is on the front."""
+    holes, pockets = [], []
     for part, (x, y, _, back, _) in board.parts.items():
         if part[0] == "U":
-            lines.append(sheet.rectangle(middle - x, y, HOLE_mm, HOLE_mm))
+            holes.append([x, -y, HOLE_mm, HOLE_mm])
         elif part[0] in "CR" and not back:
             ends = [board.pads[part, pad] for pad in "12"]
-            w, h = (abs(ends[0][axis] - ends[1][axis]) + ends[0][axis + 2] + 2 * PLAY_mm for axis in (0, 1))
-            lines.append(sheet.rectangle(middle - x, y, w, h, "cut"))
-    return lines
+            pockets.append([x, -y, *(abs(ends[0][axis] - ends[1][axis]) + ends[0][axis + 2] + 2 * PLAY_mm for axis in (0, 1))])
+    both = ", ".join(str([[round(mm, 4) + 0.0 for mm in place] for place in places]) for places in (holes, pockets))
+    return f'// Written by boards/drawing/draw.py.\ninclude <../../mould.scad>\npart = "";\nplate({both}, {POCKET_mm});\n'
 
 
 def drawn(board, name):
-    """Both sides at 1:1, the back as one sees it: the assembly drawing. And the base plate."""
+    """Both sides at 1:1, the back as one sees it: the assembly drawing."""
     (left, top), (right, bottom) = board.outline
     lines = []
     for back, words in ((False, "front: sensors"), (True, "back")):
@@ -61,12 +48,12 @@ def drawn(board, name):
         shown = {part: place for part, place in board.parts.items() if place[3] == back}
         lines += [sheet.rectangle(middle + side * x, y, w, h, "cut") for (part, _), (x, y, w, h, _) in board.pads.items() if part in shown]
         lines += [sheet.text(middle + side * x, y + 0.8, part, anchor="middle") for part, (x, y, *_) in shown.items()]
-    lines += plate(board, 2 * (right - left + 12)) + sheet.ruler(left, bottom + 8)
-    return sheet.sheet(f"Circuit board of {name}, both sides, 1:1", left - 4, top - 8, 3 * (right - left) + 32, bottom - top + 22, lines)
+    lines += sheet.ruler(left, bottom + 8)
+    return sheet.sheet(f"Circuit board of {name}, both sides, 1:1", left - 4, top - 8, 2 * (right - left) + 20, bottom - top + 22, lines)
 
 
 def files(path, listed, part_of):
     """{path: text}. path: the .kicad_pcb."""
     board = pcb_check.Board(path.read_text(encoding="utf-8"))
-    texts = {"-bom.csv": bom(board, listed, part_of), "-placement.csv": placement(board), ".svg": drawn(board, path.parents[1].name)}
+    texts = {"-bom.csv": bom(board, listed, part_of), "-plate.scad": plate(board), ".svg": drawn(board, path.parents[1].name)}
     return {path.with_name(path.stem + ending): text for ending, text in texts.items()}

@@ -15,6 +15,7 @@ NEAR_mm = 4  # a capacitor to its part, from pad to pad
 PIN_pF, TRACK_pF_mm = 10, 0.1  # a pin, as UM10204 allows at most; a track over a plane 1.6 mm below (a guess: none was measured)
 PADS_mm = {"1": (-1, -1), "2": (-1, 1), "3": (1, 1), "4": (1, -1)}  # of a sensor, from its middle; y down
 PICO_mm = 17.78 / 2 + 0.9, 2.54  # its pads' rows on the back, USB at the top: from its middle, and pitch
+LEGS_mm = (2.725, -24, 2.2), (2.425, -20.97, 1.85)  # holes for those of its USB socket, on both sides of its middle
 
 
 def parsed(text):
@@ -84,39 +85,40 @@ class Board:
 
 def expected(descriptor):
     """{net: set of pads}, without resistors and capacitors, whose names are free; and what pulls which net up, in ohms."""
-    return (of_parallel if descriptor["bus"] == "parallel" else of_multiplexed)(descriptor["wiring"], descriptor["pull_ups_ohm"])
+    w, nets = descriptor["wiring"], collections.defaultdict(set)
+    wires, pulls = (of_parallel if descriptor["bus"] == "parallel" else of_multiplexed)(w, descriptor["pull_ups_ohm"])
+    for k in range(w["sensor_count"]):
+        wires += [("GND", f"U{k}", 1), ("3V3", f"U{k}", 2), (f"SDA{k}", f"U{k}", 4)]
+    for net, part, pad in wires:
+        nets[net].add((part, str(pad)))
+    return nets, pulls
 
 
 def of_parallel(w, ohm):
-    count, of_pico = range(w["sensor_count"]), lambda name: ("A0", str(pico.pin(name)))
-    nets = {
-        "GND": {(f"U{k}", "1") for k in count} | {("A0", str(n)) for n in pico.grounds()} | {of_pico("AGND")},
-        "3V3": {(f"U{k}", "2") for k in count} | {of_pico("3V3")},
-        "SCL": {(f"U{k}", "3") for k in count} | {of_pico(f"GP{w['pin_scl']}")},
-    } | {f"SDA{k}": {(f"U{k}", "4"), of_pico(f"GP{k}")} for k in count}
+    count = range(w["sensor_count"])
+    pins = {"3V3": "3V3", "AGND": "GND", f"GP{w['pin_scl']}": "SCL"} | {f"GP{k}": f"SDA{k}" for k in count}
+    wires = [("GND", "A0", pin) for pin in pico.grounds()] + [(net, "A0", pico.pin(name)) for name, net in pins.items()]
     if "pin_sync" in w:
-        nets["SYNC"] = {of_pico(f"GP{w['pin_sync']}"), ("J0", "1")}
-    return nets, {"SCL": ohm["scl"]} | {f"SDA{k}": ohm["sda"] for k in count}
+        wires += [("SYNC", "A0", pico.pin(f"GP{w['pin_sync']}")), ("SYNC", "J0", 1)]
+    return wires + [("SCL", f"U{k}", 3) for k in count], {"SCL": ohm["scl"]} | {f"SDA{k}": ohm["sda"] for k in count}
 
 
 def of_multiplexed(w, ohm):
-    nets = {"GND": {("X0", pad) for pad in ("1", "8", "MP", "MP+")}, "3V3": {("X0", "2")}, "SDA": {("X0", "3")}, "SCL": {("X0", "4")}}
+    wires = [(net, "X0", pad) for pad, net in {1: "GND", 2: "3V3", 3: "SDA", 4: "SCL", 8: "GND", "MP": "GND", "MP+": "GND"}.items()]
     pulls = {"SDA": ohm["bus"], "SCL": ohm["bus"]}
     for strip in range(-(-w["sensor_count"] // w["sensors_of_strip"])):
-        mux, address = f"M{strip}", int(w["mux_address_0"], 0) + strip
-        nets[f"RESET{strip}"], pulls[f"RESET{strip}"] = {("X0", str(5 + strip)), (mux, "3")}, ohm["reset"]
-        for bit, pad in enumerate(("1", "2", "21")):
-            nets["3V3" if address >> bit & 1 else "GND"].add((mux, pad))
-        for net, pad in {"GND": "12", "SCL": "22", "SDA": "23", "3V3": "24"}.items():
-            nets[net].add((mux, pad))
+        mux, reset, address = f"M{strip}", f"RESET{strip}", int(w["mux_address_0"], 0) + strip
+        pulls[reset] = ohm["reset"]
+        wires += [(reset, "X0", 5 + strip)] + [
+            (net, mux, pad) for pad, net in {3: reset, 12: "GND", 22: "SCL", 23: "SDA", 24: "3V3"}.items()
+        ]
+        wires += [("3V3" if address >> bit & 1 else "GND", mux, pad) for bit, pad in enumerate((1, 2, 21))]
     for k in range(w["sensor_count"]):
         strip, channel = divmod(k, w["sensors_of_strip"])
         data = 4 + 2 * channel + (channel > 3)  # the eight channels' SD and SC by turns, with GND between
-        nets |= {f"SDA{k}": {(f"M{strip}", str(data)), (f"U{k}", "4")}, f"SCL{k}": {(f"M{strip}", str(data + 1)), (f"U{k}", "3")}}
+        wires += [(f"SDA{k}", f"M{strip}", data), (f"SCL{k}", f"M{strip}", data + 1), (f"SCL{k}", f"U{k}", 3)]
         pulls |= {f"SDA{k}": ohm["channel"], f"SCL{k}": ohm["channel"]}
-        nets["GND"].add((f"U{k}", "1"))
-        nets["3V3"].add((f"U{k}", "2"))
-    return nets, pulls
+    return wires, pulls
 
 
 def ohms(text):
@@ -160,24 +162,28 @@ def rises_ns(descriptor, board):
     return {net: 0.847 * ohm * pF[net] / 1000 for net, ohm in pulls.items()}
 
 
+def places(board, sensors):
+    """{(part, pad): where it must be}: of the sensors, and of a Pico on the back, USB at the top, from where its middle is."""
+    found = {(f"U{k}", pad): (x + dx, dy - y) for k, (x, y) in enumerate(sensors) for pad, (dx, dy) in PADS_mm.items()}
+    for x, y, *_ in [place for name, place in board.parts.items() if name == "A0"]:
+        for first, side in ((1, 1), (21, -1)):
+            found |= {("A0", str(first + n)): (x + side * PICO_mm[0], y + side * PICO_mm[1] * (n - 9.5)) for n in range(20)}
+    return found
+
+
 def wrong_places(board, sensors):
     errors, measures = [], mould.measures(sensors)
+    for pad, place in places(board, sensors).items():
+        off = math.dist(board.pads.get(pad, (math.inf, math.inf))[:2], place)
+        if off > 0.001:
+            errors.append(f"pad {pad[1]} of {pad[0]} is {off:.3f} mm off")
     for k, (x, y) in enumerate(sensors):
-        for pad, (dx, dy) in PADS_mm.items():
-            off = math.dist(board.pads.get((f"U{k}", pad), (math.inf, math.inf))[:2], (x + dx, -y + dy))
-            if off > 0.001:
-                errors.append(f"pad {pad} of sensor {k} is {off:.3f} mm off")
         errors += [f"a via under sensor {k}" for vx, vy in board.vias if max(abs(vx - x), abs(vy + y)) < VIA_FREE_mm]
-    x, y = board.parts.get("A0", (0, 0))[:2]
-    for pad in (pad for part, pad in board.pads if part == "A0"):
-        row, n = divmod(int(pad) - 1, 20)
-        place = (x + PICO_mm[0] * (1 - 2 * row), y + PICO_mm[1] * (19 - 2 * n if row else 2 * n - 19) / 2)
-        if math.dist(board.pads["A0", pad][:2], place) > 0.001:
-            errors.append(f"pad {pad} of the Pico is not where its land has it, with its top outwards")
-    if sorted(board.holes) != sorted((x, -y, mould.SCREW_mm) for x, y in measures.screws):
-        errors.append("the holes are not the base plate's")
-    half = [mm / 2 for mm in measures.outside]
-    if board.outline != ((-half[0], -half[1]), (half[0], half[1])):
+    holes, pico = [(x, -y, mould.SCREW_mm) for x, y in measures.screws], board.parts.get("A0")
+    holes += [(pico[0] + side * x, pico[1] + y, mm) for x, y, mm in LEGS_mm for side in (-1, 1) if pico]
+    if sorted(board.holes) != sorted(holes):
+        errors.append("the holes are not those of the base plate and of the Pico")
+    if board.outline != tuple(tuple(sign * mm / 2 for mm in measures.outside) for sign in (-1, 1)):
         errors.append(f"the outline is {board.outline}, not the base plate's")
     tracks = [tuple(sorted((track[:2], track[2:4]))) + track[4:] for track in board.tracks]
     return errors + [f"two tracks lie on each other at {track[0]}" for track in sorted(set(tracks)) if tracks.count(track) > 1]

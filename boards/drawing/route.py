@@ -45,11 +45,12 @@ class Grid:
         y, x = divmod(node % self.cells, self.nx)
         return (x - self.half[0]) * GRID_um, (y - self.half[1]) * GRID_um
 
-    def fix(self, rectangle, layers, net, clearance=CLEARANCE_um, kinds=(TRACK_um, VIA_um)):
-        for kind in kinds:
+    def fix(self, rectangle, layers, net, clearance=CLEARANCE_um):
+        """layers: of the tracks for which it is in the way; it always is for vias."""
+        for kind, planes in ((TRACK_um, layers), (VIA_um, (0,))):
             fixed = self.fixed[kind]
             for cell in self.near(rectangle, kind // 2 + clearance):
-                for node in {cell + layer * self.cells * (kind == TRACK_um) for layer in layers}:
+                for node in (cell + plane * self.cells for plane in planes):
                     fixed[node] = net if fixed[node] in (0, net) else TAKEN
 
     def takes(self, nodes, vias):
@@ -139,24 +140,20 @@ def tree(pads):
     return found
 
 
-def route(size, pads, screws, no_vias, no_back):
-    """In mm. size: of the board; pads: [(net or None, layer (0 front, 1 back), x, y, w, h)]; screws: [(x, y, radius)] without copper; no_vias, no_back:
-    rectangles. Returns {net: (tracks [(x0, y0, x1, y1, layer)], vias [(x, y)])} in um."""
+def route(size, pads, free):
+    """In mm. size: of the board; pads: [(net or None, layer (0 front, 1 back), x, y, w, h)]; free: [(layers without tracks, rectangle without vias)].
+    Returns {net: (tracks [(x0, y0, x1, y1, layer)], vias [(x, y)])} in um."""
     grid, (w, h) = Grid(*size), whole(mm / 2 for mm in size)
     for edge in ((-w, -h, w, -h), (-w, h, w, h), (-w, -h, -w, h), (w, -h, w, h)):
         grid.fix(edge, (0, 1), TAKEN, EDGE_um)
-    for x, y, radius in screws:
-        grid.fix(whole((x, y, x, y)), (0, 1), TAKEN, round(1000 * radius))
-    for rectangle in no_vias:
-        grid.fix(whole(rectangle), (0,), TAKEN, 0, (VIA_um,))
-    for rectangle in no_back:
-        grid.fix(whole(rectangle), (1,), TAKEN, 0)
+    for layers, rectangle in free:
+        grid.fix(whole(rectangle), layers, TAKEN)
     ends = {net: [] for net in sorted({pad[0] for pad in pads} - {None})}
     numbers = {None: TAKEN} | {net: n + 1 for n, net in enumerate(ends)}
     boxes = [(net, layer, whole((x - w / 2, y - h / 2, x + w / 2, y + h / 2))) for net, layer, x, y, w, h in pads]
     for net, layer, box in boxes:
         grid.fix(box, (layer,), numbers[net])
-        grid.fix(box, (0,), TAKEN, 0, (VIA_um,))  # a via in a pad takes its solder
+        grid.fix(box, (), TAKEN, 0)  # a via in a pad takes its solder
     for net, layer, box in boxes:
         if net:
             nodes = {layer * grid.cells + cell for cell in grid.near(box, 0)}

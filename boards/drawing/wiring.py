@@ -128,8 +128,10 @@ def table(board):
     for strip in range(board.strips):
         sensors = board.sensors_of(strip)
         page += f"| {strip} | 0x{board.mux_address(strip):02x} | {', '.join(levels(board, strip))} | 0 to {len(sensors) - 1}: SDA and SCL of sensors {sensors[0]} to {sensors[-1]} |\n"
-    wires = ", ".join(f"{pin + 1} {wire}" for pin, wire in enumerate(cable(board)))
-    return f"{page}\nOn a circuit board the connector has, from pin 1: {wires}.\n"
+    page += "\n| pin of the connector on a circuit board | wire | pin of the Pico |\n|---|---|---|\n"
+    first, *grounds = pico.grounds()
+    ends = [first, pico.pin("3V3"), *(pico.pin(f"GP{gpio}") for gpio in gpios(board)[: 2 + board.strips]), *grounds]
+    return page + "".join(f"| {i + 1} | {wire} | {end} |\n" for i, (wire, end) in enumerate(zip(cable(board), ends)))
 
 
 def parts(board):
@@ -146,6 +148,7 @@ def parts(board):
             (2 * board.sensors, ohm["channel"], "pull-ups of each channel"),
             (board.strips, ohm["reset"], "pull-up of each RESET, which holds it while the Pico starts"),
         ]
+        found += [(1, "connector", "only on a circuit board, as the next three"), (1, "housing", ""), (8, "contact", ""), (8, "wire", "")]
         capacitors = board.sensors + board.strips
     return found + [(capacitors, "capacitor", "at each part's VDD")]
 

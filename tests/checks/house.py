@@ -53,13 +53,13 @@ LIMITS = {
     "private_words": (150, 150),
     "unformatted_files": (0, 0),
     "longest_function_lines": (60, 60),
-    "board_lines": (900, 958),
+    "board_lines": (900, 948),
     "app_ifs": (1, 1),
 }
 APART = ("firmware/fit/", "firmware/condition/")  # from longest_file
 SOURCES = {".c", ".h", ".cpp", ".hpp", ".S", ".py", ".mjs", ".ts", ".mts", ".sh", ".cmake", ".inc", ".css", ".toml"}
 TEXTS = SOURCES | {".md", ".txt", ".json", ".html", ".in", ".1", ".bash", ".fish", ".cfg", ".msg", ""}
-CIRCUIT_BOARD = re.compile(r"boards/drawing/(layout|route|board_file|fabricate|pcb|pcb_check)\.py|tests/checks/(kicad|test_pcb)\.py")
+CIRCUIT_BOARD = re.compile(r"boards/drawing/(layout|route|board_file|fabricate|pcb|pcb_check)\.py|tests/checks/test_pcb\.py")
 CODE = {".c", ".h", ".cpp", ".hpp", ".py", ".js", ".mjs", ".ts", ".mts"}
 STAGES = "firmware/app/stages.c"  # lists the stages of each scene
 # Words that readers from elsewhere do not know in this sense, and what the field writes instead.

@@ -173,7 +173,9 @@ class Tree(unittest.TestCase):
         source = self.tree / "boards/pads/3x5.json"
         source.write_text(source.read_text().replace('"pitch_mm": 9', '"pitch_mm": 9.5', 1))
         status, err = self.told("--check")
-        self.assertEqual([line.split()[0] for line in err.splitlines()], ["boards/placement.svg", "boards/mould.svg", "boards/BUILD.md"])
+        self.assertEqual(
+            [line.split()[0] for line in err.splitlines()], ["boards/mould_measures.scad", "boards/mould.svg", "boards/BUILD.md"]
+        )
 
     def test_a_page_without_a_place(self):
         page = self.tree / "boards/BUILD.md"

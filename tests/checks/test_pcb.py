@@ -1,6 +1,7 @@
 """Every kind of error that is planted in a circuit board is found, by the check of nets and places (Pcb) or by KiCad (Copper; exit status 77 without it)."""
 
-import copy
+import collections
+import csv
 import json
 import math
 import pathlib
@@ -12,15 +13,19 @@ import unittest
 import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "boards/drawing"))
-sys.path.insert(0, str(ROOT / "tests/support"))
-import called  # noqa: E402
+sys.path[:0] = [str(ROOT / "boards/drawing"), str(ROOT / "tests/support")]
 import draw  # noqa: E402
 import figures as figures_file  # noqa: E402
 import geometry  # noqa: E402
 import pcb_check  # noqa: E402
 
-PART = r'  \(footprint "[^"]*" \(layer "[FB].Cu"\) \(at [^)]*\) \(attr smd\)\n    \(fp_text reference "%s".*?\n  \)\n'
+try:
+    import fabricate  # noqa: E402
+    import pcbnew  # noqa: E402
+except ImportError:
+    pcbnew = None
+
+PART = r'  \(footprint "[^"]*" \(layer "[FB].Cu"\) \(at [^)]*\) \(attr [^)]*\)\n    \(fp_text reference "%s".*?\n  \)\n'
 
 
 def part(name, change):
@@ -48,98 +53,121 @@ def added(line):
     return lambda text: text.rstrip()[:-1] + f"  {line}\n)\n"
 
 
-TRACK = '(segment (start %s) (end %s) (width 0.25) (layer "%s.Cu") (net %d))'
-VIA = '(via (at 100 100) (size 0.6) (drill 0.3) (layers "F.Cu" "B.Cu") (net 2))'
+TRACK = '(segment (start %s) (end %s) (width %g) (layer "%s.Cu") (net %d))'
+VIA = '(via (at 101.9 101.9) (size 0.6) (drill 0.3) (layers "F.Cu" "B.Cu") (net 2))'
 NETS_AND_PLACES = {
-    "a sensor moved by 2 um": part("U3", moved(0, 0.002)),
-    "a sensor turned": part("U7", pads_at(lambda x, y: f"{y:g} {-x:g}")),
-    "a sensor mirrored": part("U7", pads_at(lambda x, y: f"{-x:g} {y:g}")),
-    "SDA and SCL of a sensor exchanged": part("U2", exchanged("3", "4")),
-    "supply and ground of a sensor exchanged": part("U2", exchanged("1", "2")),
-    "two sensors exchanged": exchanged("U0", "U1"),
-    "the Pico's rows too near": part("A0", pads_at(lambda x, y: f"{0.98 * x:g} {y:g}")),
-    "two pins of the Pico exchanged": part("A0", exchanged("1", "2")),
-    "a capacitor missing": part("C4", lambda _: ""),
-    "a capacitor far away": part("C4", moved(-30, 0)),
-    "a capacitor of another value": part("C4", replaced("100 nF", "10 nF")),
-    "a resistor missing": part("R5", lambda _: ""),
-    "a resistor of another value": part("R5", replaced("3.3 kOhm", "33 kOhm")),
-    "a resistor on another line": part("R5", replaced("SDA5", "SDA6")),
-    "the sync pad missing": part("J0", lambda _: ""),
-    "two tracks on each other": replaced(r"(  \(segment .*\n)", r"\1\1"),
-    "a via under a sensor": added(VIA),
-    "a hole elsewhere": replaced(r"\(at 126 100\) \(attr exclude", "(at 125 100) (attr exclude"),
-    "another outline": replaced(r"\(end 129 138\)", "(end 129 137)"),
+    "parallel": {
+        "a sensor moved by 2 um": part("U3", moved(0, 0.002)),
+        "a sensor turned": part("U7", pads_at(lambda x, y: f"{y:g} {-x:g}")),
+        "a sensor mirrored": part("U7", pads_at(lambda x, y: f"{-x:g} {y:g}")),
+        "SDA and SCL of a sensor exchanged": part("U2", exchanged("3", "4")),
+        "supply and ground of a sensor exchanged": part("U2", exchanged("1", "2")),
+        "two sensors exchanged": exchanged("U0", "U1"),
+        "the Pico's rows too near by 2 um": part("A0", pads_at(lambda x, y: f"{0.9998 * x:.6g} {y:g}")),
+        "two pins of the Pico exchanged": part("A0", exchanged("1", "2")),
+        "a leg of the USB socket without its hole": part("A0", replaced(r"    \(pad \"\" np_thru_hole .*\n", "")),
+        "a narrow hole for a leg": part("A0", replaced(r"\(size 1.85 1.85\)", "(size 1.5 1.5)")),
+        "a capacitor missing": part("C4", lambda _: ""),
+        "a capacitor 4.01 mm from its sensor": part("C4", moved(-1.6, 0)),
+        "a capacitor of another value": part("C4", replaced("100 nF", "10 nF")),
+        "a resistor missing": part("R5", lambda _: ""),
+        "a resistor of the next value": part("R5", replaced("3.3 kOhm", "3.6 kOhm")),
+        "a resistor on the next line": part("R5", replaced("SDA5", "SDA6")),
+        "the sync pad missing": part("J0", lambda _: ""),
+        "two tracks on each other": replaced(r"(  \(segment .*\n)", r"\1\1"),
+        "a via at the corner of a sensor": added(VIA),
+        "a hole elsewhere": part("H1", moved(0.01, 0)),
+        "another outline": replaced(r"\(end 129 138\)", "(end 129 137.99)"),
+    },
+    "multiplexed": {
+        "SD and SC of a channel exchanged": part("M1", exchanged("4", "5")),
+        "two multiplexers exchanged": exchanged("M0", "M1"),
+        "an address pin on another level": part("M1", replaced('"3V3"', '"GND"')),
+        "a multiplexer without its capacitor": part("C16", lambda _: ""),
+        "two wires of the connector exchanged": part("X0", exchanged("2", "3")),
+        "a pull-up of a channel missing": part("R7", lambda _: ""),
+    },
 }
-MULTIPLEXED = {
-    "SD and SC of a channel exchanged": part("M1", exchanged("4", "5")),
-    "two multiplexers exchanged": exchanged("M0", "M1"),
-    "an address pin on another level": part("M1", replaced('"3V3"', '"GND"')),
-    "a multiplexer without its capacitor": part("C16", lambda _: ""),
-    "two wires of the connector exchanged": part("X0", exchanged("2", "3")),
-    "a pull-up of a channel missing": part("R7", lambda _: ""),
+COPPER = {  # each named by what finds it: a word of KiCad's rule check, or lands_off
+    "parallel": {
+        "unconnected_items: a track is missing": replaced(r"  \(segment .*\n", ""),
+        "clearance: a track between two lines": added(TRACK % ("91 81", "100 81", 0.25, "F", 3)),
+        "items_not_allowed: a track under a screw": added(TRACK % ("122.75 98", "122.75 102", 0.25, "B", 2)),
+        "items_not_allowed: a track under a test point of the Pico": added(TRACK % ("102.1 93", "102.1 94", 0.25, "B", 2)),
+        "items_not_allowed: a via at the corner of a sensor": added(VIA),
+        "courtyards_overlap: a part on another": part("C4", moved(0.74, 0)),
+        "lands_off: a part of the front mirrored": part("U7", pads_at(lambda x, y: f"{-x:g} {y:g}")),
+    },
+    "multiplexed": {
+        "unconnected_items: a via is missing": replaced(r"  \(via .*\n", ""),
+        "copper_edge_clearance: a track 0.48 mm from the edge": added(TRACK % ("71.6 120", "71.6 121", 0.25, "B", 2)),
+        "track_width: a thin track": added(TRACK % ("72 120", "72 121", 0.24, "B", 2)),
+        "clearance: wide tracks": replaced(r"\(width 0.25\)", "(width 0.36)", 0),
+        "lands_off: a part of the back mirrored": part("M1", pads_at(lambda x, y: f"{-x:g} {y:g}")),
+        "lands_off: pads of another size": part("X0", replaced(r"\(size 0.6 1.55\)", "(size 0.598 1.55)")),
+    },
 }
 DESCRIPTORS = {
-    "another pin of SCL": ("parallel", lambda board: board["wiring"].update(pin_scl=16)),
-    "another sync pin": ("parallel", lambda board: board["wiring"].update(pin_sync=21)),
-    "another pull-up of SDA": ("parallel", lambda board: board["pull_ups_ohm"].update(sda=4700)),
-    "another pull-up of SCL": ("parallel", lambda board: board["pull_ups_ohm"].update(scl=2200)),
-    "faster edges of SCL than the tracks allow": ("parallel", lambda board: board["rise_ns"].update(scl=140)),
-    "another address": ("multiplexed", lambda board: board["wiring"].update(mux_address_0="0x74")),
-    "another pull-up of the bus": ("multiplexed", lambda board: board["pull_ups_ohm"].update(bus=3300)),
-    "another pull-up of a channel": ("multiplexed", lambda board: board["pull_ups_ohm"].update(channel=22000)),
-    "another pull-up of RESET": ("multiplexed", lambda board: board["pull_ups_ohm"].update(reset=4700)),
-}
-COPPER = {
-    "a track is missing": ("parallel", replaced(r"  \(segment .*\n", "")),
-    "a via is missing": ("multiplexed", replaced(r"  \(via .*\n", "")),
-    "a track between two lines": ("parallel", added(TRACK % ("91 81", "100 81", "F", 3))),
-    "a track at the edge": ("multiplexed", added(TRACK % ("71.1 100", "71.1 110", "B", 2))),
-    "a track under a screw": ("parallel", added(TRACK % ("123.5 98", "123.5 102", "B", 2))),
-    "wide tracks": ("multiplexed", replaced(r"\(width 0.25\)", "(width 0.5)", 0)),
-    "a via under a sensor": ("parallel", added(VIA)),
-    "a part on another": ("parallel", part("C4", moved(2, 0))),
-    "a part of the front mirrored": ("parallel", part("U7", pads_at(lambda x, y: f"{-x:g} {y:g}"))),
-    "a part of the back mirrored": ("multiplexed", part("M1", pads_at(lambda x, y: f"{-x:g} {y:g}"))),
-    "pads of another size": ("multiplexed", part("X0", replaced(r"\(size 0.6 1.55\)", "(size 0.5 1.55)"))),
+    "parallel": {"wiring": {"pin_scl": 16, "pin_sync": 21}, "pull_ups_ohm": {"sda": 3600, "scl": 1100}, "rise_ns": {"scl": 148}},
+    "multiplexed": {"wiring": {"mux_address_0": "0x71"}, "pull_ups_ohm": {"bus": 2400, "channel": 30000, "reset": 9100}},
 }
 FOLDERS = {json.loads(path.with_name("board.json").read_text(encoding="utf-8"))["bus"]: path for path in ROOT.glob("boards/*/pcb")}
 BOARDS = {bus: json.loads(folder.with_name("board.json").read_text(encoding="utf-8")) for bus, folder in FOLDERS.items()}
 TEXTS = {bus: next(folder.glob("*.kicad_pcb")).read_text(encoding="utf-8") for bus, folder in FOLDERS.items()}
+SENSORS = geometry.places()
 
 
 def errors_of_boards():
-    return [line for bus, text in TEXTS.items() for line in pcb_check.wrong(text, BOARDS[bus], geometry.places())]
+    return [line for bus, text in TEXTS.items() for line in pcb_check.wrong(text, BOARDS[bus], SENSORS)]
 
 
 def errors_of_plants():
     """{what was planted: what the check of nets and places finds}"""
-    sensors, found = geometry.places(), {}
-    for bus, plants in (("parallel", NETS_AND_PLACES), ("multiplexed", MULTIPLEXED)):
-        found |= {name: pcb_check.wrong(plant(TEXTS[bus]), BOARDS[bus], sensors) for name, plant in plants.items()}
-    for name, (bus, plant) in DESCRIPTORS.items():
-        plant(spoilt := copy.deepcopy(BOARDS[bus]))
-        found[name] = pcb_check.wrong(TEXTS[bus], spoilt, sensors)
-    return found | {"another pitch": pcb_check.wrong(TEXTS["parallel"], BOARDS["parallel"], [(1.02 * x, y) for x, y in sensors])}
+    found = {"another pitch": pcb_check.wrong(TEXTS["parallel"], BOARDS["parallel"], [(1.0002 * x, y) for x, y in SENSORS])}
+    for bus, board in BOARDS.items():
+        found |= {name: pcb_check.wrong(plant(TEXTS[bus]), board, SENSORS) for name, plant in NETS_AND_PLACES[bus].items()}
+        for section, plants in DESCRIPTORS[bus].items():
+            for key, value in plants.items():
+                found[f"{section}: {key} of {bus}"] = pcb_check.wrong(TEXTS[bus], board | {section: board[section] | {key: value}}, SENSORS)
+    return found
 
 
 def laid_otherwise():
     return [path.name for path, text in draw.laid(ROOT).items() if path.read_text(encoding="utf-8") != text]
 
 
-def differing(one, other):
-    return [path for path in sorted(one.rglob("*.*")) if path.read_bytes() != (other / path.relative_to(one)).read_bytes()]
+def lands_off(board):
+    """Pads that differ from those of KiCad's own parts, which KiCad turns and flips: mirrored parts show in nothing else."""
+    pads_of = lambda part: {(pad.GetName(), *pad.GetCenter(), *pad.GetSize()) for pad in part.Pads()}
+    off, scratch = 0, pcbnew.BOARD()  # flipping a part that is on no board crashes
+    for ours in board.Footprints():
+        library = pathlib.Path(f"/usr/share/kicad/footprints/{ours.GetFPID().GetLibNickname()}.pretty")
+        if library.is_dir():
+            other = pcbnew.FootprintLoad(str(library), str(ours.GetFPID().GetLibItemName()))
+            scratch.Add(other)
+            other.SetPosition(ours.GetPosition())
+            if ours.IsFlipped():
+                other.Flip(ours.GetPosition(), True)
+            other.SetOrientation(ours.GetOrientation())
+            off += len(pads_of(other) ^ pads_of(ours))
+    return off
 
 
-def off_um(folder, board, sensors):
+def placements_off(folder, board):
+    """Parts that KiCad places elsewhere than the board has them."""
+    rows = csv.reader(next(folder.glob("*-placement.csv")).read_text(encoding="utf-8").splitlines()[1:])
+    found = {(name, float(x.removesuffix("mm")), float(y.removesuffix("mm")), side == "Bottom") for name, x, y, side, _ in rows}
+    return len(found ^ {(name, round(x, 4), round(-y, 4), back) for name, (x, y, _, back, value) in board.parts.items() if value})
+
+
+def off_um(folder, board):
     """How far a pad of a sensor lies off in the Gerber of the front, and a hole in the drill files, at most."""
     (path,) = folder.glob("*.zip")
     with zipfile.ZipFile(path) as files:
         copper, *drills = (files.read(name).decode() for name in sorted(files.namelist()) if name.endswith(("F_Cu.gbr", ".drl")))
     flashes = re.findall(r"%TO\.P,(U\d+),(\d)[^%]*%\n(?:%[^\n]*\n|D\d+\*\n)*X(-?\d+)Y(-?\d+)D03", copper)
     pads = {(part, pad): (int(x) / 1e6, int(y) / 1e6) for part, pad, x, y in flashes}
-    wanted = {(f"U{k}", pad): (x + dx, y - dy) for k, (x, y) in enumerate(sensors) for pad, (dx, dy) in pcb_check.PADS_mm.items()}
-    pairs = [(pads[pad], place) for pad, place in wanted.items()]
+    pairs = [(pads[pad], (x, -y)) for pad, (x, y) in pcb_check.places(board, SENSORS).items() if pad[0] != "A0"]
     holes = sorted((float(x), float(y)) for drill in drills for x, y in re.findall(r"^X(-?[\d.]+)Y(-?[\d.]+)$", drill, re.MULTILINE))
     pairs += zip(holes, sorted([(x, -y) for x, y, *_ in board.holes + board.vias]), strict=True)
     return 1000 * max(math.dist(*pair) for pair in pairs)
@@ -159,40 +187,41 @@ class Written(unittest.TestCase):
 
 
 class Copper(unittest.TestCase):
-    def test_wrong_copper_is_found_by_kicad(self):
+    def judged(self, bus, plant=str):
+        """{what KiCad finds on this board, with an error planted: how often}"""
         folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
-        plants = {f"none, {bus}": (bus, lambda text: text) for bus in FOLDERS} | COPPER
-        for name, (bus, plant) in plants.items():
-            shutil.copytree(FOLDERS[bus], folder / name)
-            next((folder / name).glob("*.kicad_pcb")).write_text(plant(TEXTS[bus]), encoding="utf-8")
-        boards = [next((folder / name).glob("*.kicad_pcb")) for name in plants]
-        lines = called.run("/usr/bin/python3", ROOT / "tests/checks/kicad.py", *boards).splitlines()
-        judged = dict(zip(plants, map(json.loads, lines), strict=True))
-        right = [judged.pop(f"none, {bus}") for bus in FOLDERS]
-        found = errors_of_plants() | {name: sum(figures.values()) for name, figures in judged.items()}
-        for run in ("one", "two"):
-            called.run("/usr/bin/python3", ROOT / "boards/drawing/fabricate.py", folder / run)
-        sensors, boards = geometry.places(), {bus: pcb_check.Board(text) for bus, text in TEXTS.items()}
-        errors = errors_of_boards()
-        off = [off_um(folder / "one" / path.parent.name, boards[bus], sensors) for bus, path in FOLDERS.items()]
+        (path,) = shutil.copytree(FOLDERS[bus], folder / "pcb").glob("*.kicad_pcb")
+        path.write_text(plant(TEXTS[bus]), encoding="utf-8")
+        board, found = fabricate.judged(path, report := folder / "report")
+        kinds = collections.Counter(re.findall(r"^\[(\w+)\]", report.read_text(encoding="utf-8"), re.MULTILINE))
+        return found | kinds | {"lands_off": lands_off(board)}
+
+    def test_wrong_copper_is_found_by_kicad(self):
+        right = [self.judged(bus) for bus in FOLDERS]
+        found = errors_of_plants()
+        found |= {name: self.judged(bus, plant).get(name.split(":")[0]) for bus in FOLDERS for name, plant in COPPER[bus].items()}
+        one, two = (pathlib.Path(self.enterContext(tempfile.TemporaryDirectory())) for _ in range(2))
+        self.assertEqual([fabricate.main([folder]) for folder in (one, two)], [0, 0])
+        boards, errors = {bus: pcb_check.Board(text) for bus, text in TEXTS.items()}, errors_of_boards()
+        differ = [path for path in one.rglob("*.*") if path.read_bytes() != (two / path.relative_to(one)).read_bytes()]
         figures = {key: sum(board[key] for board in right) for key in right[0]} | {
             "boards": len(FOLDERS),
             "netlist_errors": len(errors),
             "vias_under_sensors": sum(line.startswith("a via under") for line in errors),
-            "pad_places_off_um": max(off),
+            "pad_places_off_um": max(off_um(one / path.parent.name, boards[bus]) for bus, path in FOLDERS.items()),
+            "placements_off": sum(placements_off(one / path.parent.name, boards[bus]) for bus, path in FOLDERS.items()),
             "rise_ns": {net: round(ns) for net, ns in pcb_check.rises_ns(BOARDS["parallel"], boards["parallel"]).items()},
             "planted": len(found),
             "planted_missed": sum(not errors for errors in found.values()),
-            "bytes_differ": len(differing(folder / "one", folder / "two")) + len(laid_otherwise()),
+            "bytes_differ": len(differ) + len(laid_otherwise()),
         }
         figures_file.add(ROOT / "build/report/board.json", figures)
         self.assertEqual([name for name, errors in found.items() if not errors], [])
         nothing = {name: value for name, value in figures.items() if name not in ("boards", "planted", "rise_ns")}
         self.assertEqual(nothing, dict.fromkeys(nothing, 0), errors)
-        self.assertGreaterEqual((figures["boards"], figures["planted"]), (2, 24))
 
 
 if __name__ == "__main__":
-    if "Copper" in sys.argv and not pathlib.Path("/usr/lib/python3/dist-packages/pcbnew.py").exists():
+    if "Copper" in sys.argv and not pcbnew:
         sys.exit(77)
     unittest.main()
