@@ -30,7 +30,7 @@
  * to rest: where it was before, within PAST_SDS of what may be kept.
  * - Its amount is uncertain, and so is what a hold itself changes in this sensor alone. past_sd_Pa_q10 is the sd of
  * both: a share of what the sensor has measured, which rises in a hold and by all that it lets go of, after a contact
- * or where one moves on, and fades with PAST_ms. The share is learnt from what stands off after each contact.
+ * or where one moves on, and fades with PAST_ms. The share is learnt from what is left after each contact.
  *
  * The level of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
  * is taken again if it was taken in the five seconds before its sensor was reset as it had lost its state, or stepped
@@ -73,7 +73,7 @@ struct condition_sensor {
   int32_t memory_Pa_q10;  /* strongest press, fading */
   int32_t reached_Pa_q10; /* the same of this contact alone */
   int32_t past_Pa_q10;    /* what rubber may keep: rises in a hold, and by all that is let go; fades in 3 s */
-  int32_t past_share;     /* sd of that, 1 / 2^16: learnt from what stands off after contacts */
+  int32_t past_share;     /* sd of that, 1 / 2^16: learnt from what is left after contacts */
   int32_t wander_Pa_q10;
   int32_t taken_Pa_q10;
   int32_t crept_Pa_q10;   /* risen slowly */

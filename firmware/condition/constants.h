@@ -63,7 +63,7 @@
 #define PAST_SHARE_FORCE 3277             /* a twentieth: twice the sd that it shows is the band of all, an eighth */
 #define PAST_SHOWS_ms ((uint32_t)MS(200)) /* after a contact; the remainder follows in 100 ms */
 #define PAST_LEAST_Pa 1000                /* less shows nothing beside noise and drift */
-#define PAST_SDS 2                        /* the zero is within as many of where it comes to rest */
+#define PAST_SDS 2                        /* the zero is within as many of where it comes to rest; twin, seeds 21 to 24 */
 #define PAST_LEARN_SHIFT 2                /* a quarter of what each release shows; choice */
 #define CROSS_SHIFT 1                     /* half of the strongest memory counts for all: far sensors keep 2 % of a peak */
 #define FRESH_ms ((uint32_t)SECONDS(2))   /* after a contact: a remainder may rise */

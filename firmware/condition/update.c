@@ -72,7 +72,7 @@ static bool is_left_by_force(const struct condition *condition, uint32_t usable)
   return pressed >= 5;
 }
 
-/* What stands off after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd. */
+/* What is left after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd. */
 static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
   struct condition_sensor *sensor = step->sensor;
   const uint32_t bit = UINT32_C(1) << step->k;

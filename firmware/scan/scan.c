@@ -9,7 +9,7 @@
 /* After a temperature reading that a sensor missed, or one in doubt. */
 #define TEMPERATURE_RETRY_us 100000u
 #define TEMPERATURE_AT_ONCE_us 1u
-/* After so long the sensors may have warmed by more than a degree: a hand warms them by 0.1 degC/s. */
+/* After this time the sensors may have warmed by more than a degree: a hand warms them by 0.1 degC/s. */
 #define TEMPERATURE_LATE_us 5000000u
 /* How soon a temperature that was not taken is tried again. */
 #define SLOT_POLL_us 1000u

@@ -187,7 +187,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     readings->doubted &= ~bit;
     readings->has_thermal |= bit;
   }
-  /* What they read before says no more. */
+  /* What they read before is no evidence any more. */
   readings->has_last &= ~(readings->jolted & (readings->suspects | readings->zero));
   readings->jolted &= ~taken->good | readings->suspects;
   news |= readings->jolted & ~readings->suspects ? READINGS_ASK_AGAIN : 0;

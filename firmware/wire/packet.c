@@ -219,7 +219,7 @@ static bool is_left_out(const struct run *when, const uint8_t *field) {
 
 static bool is_sensor_count(uint8_t count) { return count >= 1 && count <= FT_MAX_SENSORS; }
 
-/* A run as so many of a simpler one, each for a sensor. */
+/* A run as a simpler one for each sensor. */
 struct repeat {
   uint8_t kind;
   uint8_t count;
