@@ -174,9 +174,15 @@ class Firmware(Library):
         if pressure_Pa_q10.ndim == 2:
             pressure_Pa_q10 = np.repeat(pressure_Pa_q10[:, None], 7, axis=1)
         found = self.made("fit_result", len(pressure_Pa_q10))
-        usable = np.full(len(found), (1 << pressure_Pa_q10.shape[2]) - 1, np.uint32) if usable is None else usable
+        usable = self.usable(pressure_Pa_q10, usable)
         self.call("fit_held", array, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, found)
         return found
+
+    @staticmethod
+    def usable(pressure_Pa_q10, usable=None):
+        """Bitmaps [contact, frame] of readings [contact, frame, sensor]: all sensors, or those of [contact] or [contact, frame]."""
+        every = (1 << pressure_Pa_q10.shape[2]) - 1 if usable is None else usable if usable.ndim == 2 else usable[:, None]
+        return np.ascontiguousarray(np.broadcast_to(every, pressure_Pa_q10.shape[:2]), np.uint32)
 
     def profile(self, thickness_mm, overhang_mm=0.0, from_touch=False, layout=None):
         """pad_profile [1] of a pad over these sensors (x_mm, y_mm, pitch_mm), or the firmware's own."""
@@ -192,7 +198,7 @@ class Firmware(Library):
         pad = self.made("fit_pad", 1)
         self.call("tangential_pad", array, profile, pad)
         shape = pressure_Pa_q10.shape[:2]
-        usable = np.full(shape, (1 << pressure_Pa_q10.shape[2]) - 1, np.uint32) if usable is None else usable
+        usable = self.usable(pressure_Pa_q10, usable)
         saturated = np.zeros(shape, np.uint32) if saturated is None else saturated
         found = self.made("fit_result", *shape), self.made("fit_tangential", *shape)
         self.call("tangential", array, pad, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, saturated, *found)

@@ -1,6 +1,7 @@
 """Fits the pressures of any array by the firmware's own code: `fingertip fit`, which starts this.
 
-found = fingertip.fit(pressures_Pa, "2x4") plt.plot(found["x_mm"], found["y_mm"], ".")
+found = fingertip.fit(pressures_Pa, "2x4")
+plt.plot(found["x_mm"], found["y_mm"], ".")
 """
 
 import argparse
@@ -10,8 +11,10 @@ import itertools
 import json
 import os
 import pathlib
+import re
 import shutil
 import sys
+import warnings
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -20,7 +23,7 @@ import numpy.typing as npt
 
 from .arrays import Firmware, MeasureError, q10, round_half_away, usable_of
 from .errors import InputError
-from .files import printable, run_tool, write_text
+from .files import printable, reporter, run_tool, write_text
 from .line import Flag
 
 FloatArray = npt.NDArray[np.float64]
@@ -32,6 +35,15 @@ NOISE_Pa = 10.0
 ROWS_AT_ONCE = 4096
 MOST_Pa = 1e6  # no such barometer measures more
 ABSOLUTE_Pa = 3e4  # the air is more, and touches are not in the median of all readings
+AIR_Pa = (8e4, 1.1e5)  # absolute pressures at rest, up to 1900 m above the sea
+LIGHT_Pa = 500.0  # a touch of some grams
+ALIKE, GAP = 0.1, 5.0  # shares: sensors at rest by the air; of the usual step in time
+LEAST = dict.fromkeys(
+    ("sigma_mm", "sigma_sd_mm", "dip_share", "dip_sd_mm", "force_scale", "force_scale_sd", "gain_sd"), 0.0
+)  # of a calibration
+LEAST |= {"gain": 1e-3, "off_x_mm": -1e3, "off_y_mm": -1e3, "wider": -1e3}
+OF_SENSORS = ("gain", "gain_sd", "off_x_mm", "off_y_mm", "wider")
+NO_PRESSURE = re.compile(r"(t|x|y|z|f|q[xyz]?|time|temp|temperature|force|row|frame|index)([_ (\[].*)?", re.IGNORECASE)
 PLACEMENT_Pa, PLACEMENTS, EVERY_s = 1500.0, 40, 8.0  # of a calibration: readings lighter than this are no placement
 
 
@@ -78,9 +90,14 @@ def _described(what: Described, folder: pathlib.Path | None = None) -> Mapping[s
             known = ", ".join(sorted(each.stem for each in folder.glob("*.json")))
             raise InputError(f"{printable(str(what))}: no such pad; give {known}, or a FILE.json that describes yours")
     try:
-        return dict(json.loads(path.read_text(encoding="utf-8")))
-    except (OSError, TypeError, ValueError) as error:
-        raise InputError(f"{printable(str(path))}: {error}") from None
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror}") from None
+    except (RecursionError, ValueError) as error:
+        raise InputError(f"{path}: no JSON: {error}") from None
+    if not isinstance(found, dict):
+        raise InputError(f"{path}: holds no object, {{...}}")
+    return found
 
 
 def read_pad(pad: Described) -> Pad:
@@ -101,8 +118,41 @@ def read_pad(pad: Described) -> Pad:
         raise InputError(f"{name}: {type(error).__name__} {error}; boards/pads/README.md has what a pad is described by") from None
 
 
-def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noise_Pa: float) -> FloatArray:
-    """Pa above the zero [row, sensor]. Raises InputError where they cannot be those of touches on the pad."""
+def _calibrated(what: Described | None, pad: Pad) -> Mapping[str, Any]:
+    known = {} if what is None else _described(what)
+    wrong = "" if what is None or known.keys() & LEAST.keys() else f"has none of {', '.join(LEAST)}"
+    for name in known.keys() & LEAST.keys():
+        values = np.array(known[name], object)
+        if values.shape != (pad.x_mm.shape if name in OF_SENSORS else ()):
+            wrong = f"{name} has {values.size} values, and pad {pad.name} has {len(pad.x_mm)} sensors"
+        elif not all(isinstance(each, int | float) and LEAST[name] <= each < MOST_Pa for each in values.flat):
+            wrong = f"{name} is {printable(str(known[name]))}"
+    if known.get("force_scale") and "force_scale_sd" not in known:
+        wrong = "force_scale comes without its standard deviation, force_scale_sd"
+    if wrong:
+        raise InputError(f"the calibration is none of this pad: {wrong}; fingertip fit --calibrate makes one")
+    return known
+
+
+def _warn(text: str) -> None:
+    warnings.warn(text, stacklevel=4)
+
+
+def _noise_Pa(table: FloatArray) -> float:
+    """Rms of rows that follow each other, from their differences."""
+    return float(np.nanmedian(np.abs(np.diff(table, axis=0)))) / (0.6745 * 2**0.5) if len(table) >= 8 else 0.0
+
+
+def _gates_Pa(noise_Pa: float) -> tuple[float, float]:
+    """Of the largest reading: a contact begins above the first, and ends below the second."""
+    of = firmware().constants
+    open_Pa, close_Pa = (float(of[f"gate_{name}_Pa"] + of[f"gate_{name}_noises"] * noise_Pa) for name in ("open", "close"))
+    return open_Pa, close_Pa
+
+
+def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noise_Pa: float, follow: bool = False) -> FloatArray:
+    """Pa above the zero [row, sensor]; follow: rows follow each other in time. Raises InputError where they cannot be those of touches on the pad,
+    warns of what makes that unlikely."""
     if unit not in UNITS:
         raise InputError(f"{printable(unit)} is no unit; give one of {', '.join(UNITS)}")
     table = UNITS[unit] * np.asarray(pressures, float)
@@ -110,20 +160,43 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
         raise InputError(
             f"pressures are {' x '.join(map(str, table.shape))}, and pad {pad.name} has {len(pad.x_mm)} sensors: rows x {len(pad.x_mm)}"
         )
-    if np.isinf(table).any() or not np.isfinite(table).any():
+    if not 0 <= zero_rows <= len(table) or not 0 < noise_Pa < MOST_Pa:
+        raise InputError(f"{zero_rows} rows at rest of {len(table)}, noise of {noise_Pa:g} Pa: give rows that are there, and noise above 0")
+    if np.isinf(table).any() or not np.isfinite(table[: zero_rows or None]).any():
         raise InputError("a pressure is infinite, or none is a number; where a sensor has none, give nan")
+    rest = table[: zero_rows or len(table)]
+    seen = np.isfinite(rest).any(axis=0)
+    level_Pa, zero_Pa = np.nanmedian(rest[:, seen], axis=0), np.where(seen, 0.0, np.nan)
+    middle_Pa = float(np.median(level_Pa))
+    alike = np.abs(level_Pa - middle_Pa).max(initial=0.0) < ALIKE * abs(middle_Pa)
+    airs = [name for name, factor in UNITS.items() if alike and AIR_Pa[0] < factor * middle_Pa / UNITS[unit] < AIR_Pa[1]]
+    scatter_Pa = _noise_Pa(rest[:, seen]) if zero_rows or follow else 0.0
+    open_Pa = _gates_Pa(max(noise_Pa, scatter_Pa))[0]
+    touch_Pa = 0.0
     if zero_rows:
-        table = table - np.nanmean(table[:zero_rows], axis=0)
-    most, middle = np.nanmax(table), np.nanmedian(table)
+        zero_Pa[seen] = np.nanmean(rest[:, seen], axis=0)
+        touch_Pa = np.nanmax(np.abs(rest - zero_Pa))
+        table = table - zero_Pa
+    most, least = np.nanmax(table), np.nanmin(table)
     wrong = ""
-    if abs(middle) > ABSOLUTE_Pa and most < MOST_Pa:
-        wrong = f"pressures are of {middle / 1000:.0f} kPa, as the air's; give the number of rows at rest at the beginning (zero)"
+    if airs and unit not in airs:
+        wrong = f"readings at rest are {middle_Pa / UNITS[unit]:.4g} {unit}, as the air's in {' or '.join(airs)}; give that unit"
+    elif not zero_rows and abs(middle_Pa) > ABSOLUTE_Pa and most < MOST_Pa:
+        wrong = f"pressures are of {middle_Pa / 1000:.0f} kPa, as the air's; give the number of rows at rest at the beginning (zero)"
     elif most > MOST_Pa:
         wrong = f"the largest pressure is {most:.3g} Pa, more than such sensors measure; give their unit"
     elif most < 6 * noise_Pa:
         wrong = f"the largest pressure is {most:.3g} Pa, below six times the noise of {noise_Pa:g} Pa: nothing touches, or the unit is another (kPa?)"
+    elif touch_Pa > open_Pa:
+        wrong = f"a reading moves by {touch_Pa:.0f} Pa in the {zero_rows} rows at rest: something touches; give fewer rows (zero)"
+    elif least < -max(most / 2, open_Pa):
+        wrong = f"pressures fall to {least:.0f} Pa, the largest is {most:.0f} Pa: the zero is that of a press; give rows at rest (zero)"
     if wrong:
         raise InputError(wrong)
+    if scatter_Pa > 2 * noise_Pa:
+        _warn(f"readings scatter by {scatter_Pa:.0f} Pa from row to row; give that as the noise, which is {noise_Pa:g} Pa")
+    if most < LIGHT_Pa:
+        _warn(f"the largest pressure is {most:.0f} Pa, that of a few grams: is the unit another (hPa, kPa)?")
     return table
 
 
@@ -139,13 +212,6 @@ def inputs(
     """What the fit gets of readings: fit_array, fit_settings, readings in 1/1024 Pa, bitmap of the usable sensors, fit_own or None. fields: of
     fit_settings."""
     known = calibration or {}
-
-    def of_sensors(name: str, otherwise: float) -> FloatArray:
-        values = np.asarray(known.get(name) or np.full(len(pad.x_mm), otherwise), float)
-        if values.shape != pad.x_mm.shape:
-            raise InputError(f"{name} of the calibration has {len(values)} values, and pad {pad.name} has {len(pad.x_mm)} sensors")
-        return values
-
     prior = {} if has_profile else {"prior_sigma_mm": known.get("sigma_mm", 0.0), "prior_width_mm": known.get("sigma_sd_mm", 0.0)}
     dip = {name: known.get(name, 0.0) for name in ("dip_share", "dip_sd_mm")}
     cut = {"cut_noises": 0} if has_profile else {}
@@ -154,19 +220,20 @@ def inputs(
     if known.get("off_x_mm"):
         own = chip.made("fit_own", 1, len(pad.x_mm))
         for key, unit in (("off_x_mm", pad.pitch_mm), ("off_y_mm", pad.pitch_mm), ("wider", 1.0)):
-            own[f"{key.removesuffix('_mm')}_q15"] = round_half_away(np.clip(32768.0 * of_sensors(key, 0.0) / unit, -32767, 32767))
-    readings = np.clip(reading_Pa / of_sensors("gain", 1.0), -MOST_Pa, MOST_Pa)
+            own[f"{key.removesuffix('_mm')}_q15"] = round_half_away(
+                np.clip(32768.0 * np.asarray(known.get(key, 0.0)) / unit, -32767, 32767)
+            )
+    readings = np.clip(reading_Pa / np.asarray(known.get("gain", 1.0)), -MOST_Pa, MOST_Pa)
     return chip.array(*pad[1:4]), settings, q10(readings), usable_of(reading_Pa), own
 
 
-def _begins(peak_Pa: FloatArray, noise_Pa: float) -> npt.NDArray[np.int64]:
-    """Of each row the first of its contact, by the firmware's gate; -1: nothing touches."""
-    of = firmware().constants
-    least_Pa = [of[f"gate_{name}_Pa"] + of[f"gate_{name}_noises"] * noise_Pa for name in ("open", "close")]
+def _begins(peak_Pa: FloatArray, noise_Pa: float, alone: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
+    """Of each row the first of its contact, by the firmware's gate; -1: nothing touches. alone: it does not follow the row before."""
+    open_Pa, close_Pa = _gates_Pa(noise_Pa)
     begins = [-1]
     for i, peak in enumerate(peak_Pa):
-        touched = begins[-1] >= 0
-        begins.append(-1 if peak <= least_Pa[touched] else begins[-1] if touched else i)
+        touched = begins[-1] >= 0 and not alone[i]
+        begins.append(-1 if peak <= (close_Pa if touched else open_Pa) else begins[-1] if touched else i)
     return np.array(begins[1:])
 
 
@@ -181,16 +248,17 @@ def fit(
     noise_Pa: float = NOISE_Pa,
 ) -> dict[str, npt.NDArray[Any]]:
     """Location, force, their standard deviations, flags, tangential force and shape of pressures [row, sensor] above the zero, NaN where a sensor has
-    none.
+    none. What is unlikely is a UserWarning.
 
     pad: a name that the tool knows, a file or its content (boards/pads/README.md); tangential force and shape need a rectangle and the rubber's
     thickness. calibration: the same, as calibrate() returns it. time_s [row]: rows follow each other, and are contacts by the firmware's gate;
-    without it each is a contact of its own, that is held. zero_rows: so many rows at the beginning are at rest. noise_Pa: rms of a reading.
+    without it each is a contact of its own, that is held. zero_rows: number of rows at the beginning that are at rest. noise_Pa: rms of a reading.
 
     Arrays [row] by the names of a recording's columns, NaN where there is none; flags are of fingertip.Flag; shape is of SHAPES. Each row is fitted
     with the 24 before it in its contact. Raises InputError, with the cause. A row takes a millisecond, or without a thickness 20 us."""
-    of_pad, known = read_pad(pad), None if calibration is None else _described(calibration)
-    reading_Pa = _readings(pressures, of_pad, unit, zero_rows, noise_Pa)
+    of_pad = read_pad(pad)
+    known = _calibrated(calibration, of_pad)
+    reading_Pa = _readings(pressures, of_pad, unit, zero_rows, noise_Pa, time_s is not None)
     chip = firmware()
     profile = None
     if of_pad.thickness_mm:
@@ -200,16 +268,28 @@ def fit(
             profile = made
     array, settings, readings, usable, own = inputs(chip, of_pad, reading_Pa, known, noise_Pa, profile is not None)
     rows = np.arange(len(readings))
-    begins = rows
+    alone = np.ones(len(rows), bool)
     if time_s is not None:
-        if np.shape(time_s) != rows.shape or not (np.diff(np.asarray(time_s, float)) > 0).all():
+        times_s = np.asarray(time_s, float)
+        steps_s = np.diff(times_s) if times_s.shape == rows.shape else np.zeros(1)
+        if not (steps_s > 0).all():
             raise InputError("time does not rise from row to row; without a time each row is a contact of its own")
-        begins = _begins(readings.max(axis=1) / 1024.0, noise_Pa)
-    touched = begins >= 0
+        alone[1:] = steps_s > GAP * np.median(steps_s) if len(steps_s) else False
+    begins = _begins(readings.max(axis=1) / 1024.0, noise_Pa, alone)
+    if time_s is not None and alone[1:].any():
+        longest = f"{steps_s.max():.3g} s before row {steps_s.argmax() + 2}"
+        _warn(f"rows are lost at {alone[1:].sum()} places, the longest of {longest}: contacts begin again there")
+    if time_s is not None and begins[:1].tolist() == [0]:
+        _warn("the first row is touched, so nothing shows that its zero is right; begin at rest")
+    scale = float(known.get("force_scale", 0.0))
+    always = int(Flag.TARED) * (zero_rows > 0) | int(Flag.CALIBRATED) * (scale > 0)
+    flags = always | np.where(usable == (1 << len(of_pad.x_mm)) - 1, 0, int(Flag.SENSOR_MASKED))
     found: dict[str, npt.NDArray[Any]] = {}
+    touched = begins >= 0
     for some in np.array_split(rows[touched], len(rows) // ROWS_AT_ONCE + 1):
-        for name, values in _fit(chip, (array, settings, readings, usable, own), profile, known or {}, some, begins[some]).items():
+        for name, values in _fit(chip, (array, settings, readings, usable, own), profile, known, some, begins[some]).items():
             found.setdefault(name, np.full(len(rows), np.nan if values.dtype == float else 0, values.dtype))[some] = values
+    found["flags"] |= flags | np.where(touched, int(Flag.CONTACT), 0)
     return found
 
 
@@ -220,10 +300,11 @@ def _fit(
     frames = int(chip.constants["shapes_frames"]) + 1 if profile is not None else 7  # that fit_held() searches
     before = np.maximum(rows[:, None] - np.arange(frames)[::-1], begins[:, None])
     held, usable = readings[before], usable[before]
-    fits = chip.fit_held(array, settings, np.ascontiguousarray(held[:, -7:]), np.ascontiguousarray(usable[:, -1]), own=own)
-    scale = float(known.get("force_scale") or 0.0)
+    fits = chip.fit_held(array, settings, np.ascontiguousarray(held[:, -7:]), usable[:, -7:], own=own)
+    scale = float(known.get("force_scale", 0.0))
+    scales = (scale, float(known["force_scale_sd"])) if scale else (1.0, float(chip.constants["default_force_scale_sd"]))
     force_N = np.zeros((len(rows), 2))
-    chip.call("weigh", scale or 1.0, float(known["force_scale_sd"]) if scale else 0.8, fits, readings[rows].max(axis=1) / 1024.0, force_N)
+    chip.call("weigh", *scales, fits, readings[rows].max(axis=1) / 1024.0, force_N)
     flags = fits["flags"].astype(np.int64)
     valid = flags & Flag.FIT_VALID != 0
     names = ("x_mm", "y_mm", "location_sd_mm", "p0_Pa", "sigma_mm", "residual_rms_Pa")
@@ -231,44 +312,59 @@ def _fit(
     found |= {"force_N": np.where(valid, force_N[:, 0], np.nan), "force_sd_N": np.where(valid, force_N[:, 1], np.nan)}
     found |= {"flags": flags, "sensors_used": fits["used"].astype(np.int64)}
     if profile is not None:
-        _add_shapes(chip, (array, settings, held, usable, own), profile, scale, found)
+        _add_shapes(chip, (array, settings, held, usable, own), profile, scales, bool(scale), found)
     return found
 
 
-def _add_shapes(chip: Any, of: tuple[Any, ...], profile: Any, scale: float, found: dict[str, npt.NDArray[Any]]) -> None:
+def _add_shapes(
+    chip: Any, of: tuple[Any, ...], profile: Any, scales: tuple[float, float], is_scaled: bool, found: dict[str, npt.NDArray[Any]]
+) -> None:
     """Where the pad and the array are such that the firmware estimates them."""
     array, settings, held, usable, own = of
     rows = len(held)
     published, pad = chip.made("published", rows), chip.made("fit_shapes_pad", 1)
     shapes, places = chip.made("fit_shapes_result", rows, 2), chip.made("shapes_place", rows, 2)
-    estimated = chip.tangential(array, profile, settings, held, np.ascontiguousarray(usable), own=own)
-    chip.call("publish", profile, np.full(rows, scale), *(np.ascontiguousarray(each[:, -1]) for each in estimated), published)
+    estimated = [np.ascontiguousarray(each[:, -1]) for each in chip.tangential(array, profile, settings, held, usable, own=own)]
+    chip.call("publish", profile, np.full(rows, scales[0] if is_scaled else 0.0), scales[1], *estimated, published)
     with contextlib.suppress(MeasureError):  # rubber too thin for the pitch has no shapes
         chip.call("shapes_pad", array, profile, pad)
-        chip.call("held_shapes", array, pad, settings, chip.no_own if own is None else own, held, published, shapes, places)
+        chip.call("held_shapes", array, pad, settings, chip.no_own if own is None else own, held, usable, published, shapes, places)
     last, shape = shapes[:, 1], shapes["shape"][:, 1].astype(np.int64)
     two, edge = (shape == SHAPES.index(name) for name in ("two", "elongated"))
     valid = published["valid"] & ~two
-    for name in ("x_mm", "y_mm", "location_sd_mm", "force_N"):
+    for name in ("x_mm", "y_mm", "location_sd_mm", "force_N", "force_sd_N"):
         found[name] = np.where(valid, published[name], found[name])
     for name in ("qx", "qy", "q_sd"):
         found[f"{name}_N"] = np.where(valid, published[name] * published["force_N"], np.nan)
     found["location_sd_mm"] = np.where((shape > 0) & ~two, places["location_sd_mm"][:, 1], found["location_sd_mm"])
     found["shape"] = shape
-    for k, (name, factor) in itertools.product(range(2), (("x_mm", 1.0), ("y_mm", 1.0), ("force_N", scale or 1.0))):
-        found[name.replace("_", f"{k + 1}_")] = np.where(two, factor * last[name][:, k].astype(float), np.nan)
+    scale, scale_sd = (each * float(profile["force_ratio"][0] if is_scaled else 1.0) for each in scales)
+    for k, (name, values) in itertools.product(
+        range(2),
+        (
+            ("x{}_mm", last["x_mm"]),
+            ("y{}_mm", last["y_mm"]),
+            ("location{}_sd_mm", last["location_sd_mm"]),
+            ("force{}_N", scale * last["force_N"]),
+            ("force{}_sd_N", np.hypot(scale * last["force_sd_N"], scale_sd * last["force_N"])),
+        ),
+    ):
+        found[name.format(k + 1)] = np.where(two, values[:, k].astype(float), np.nan)
     found["edge_angle_deg"] = np.where(edge, np.degrees(np.arctan2(last["along_y"], last["along_x"])), np.nan)
     found["edge_length_mm"] = np.where(edge, last["length_mm"].astype(float), np.nan)
     uncertain = found["location_sd_mm"] > chip.constants["location_sd_limit_mm"]
-    of_shape = (
+    elongated = np.where(valid, estimated[1]["elongated"], found["flags"] & Flag.ELONGATED)
+    of_flags = (
+        (valid, Flag.TANGENTIAL_VALID),
+        (uncertain, Flag.UNCERTAIN),
+        (elongated, Flag.ELONGATED),
         (shape > 0, Flag.SHAPE_VALID),
         (two, Flag.TWO_CONTACTS),
         (edge, Flag.EDGE),
         (shape == SHAPES.index("none"), Flag.SHAPE_UNKNOWN),
     )
-    found["flags"] &= ~int(Flag.UNCERTAIN)
-    for these, flag in ((valid, Flag.TANGENTIAL_VALID), (uncertain, Flag.UNCERTAIN), *of_shape):
-        found["flags"] |= np.where(these, int(flag), 0)
+    for these, flag in of_flags:
+        found["flags"] = found["flags"] & ~int(flag) | np.where(these, int(flag), 0)
 
 
 def response_of(found: Any, sensors: Any) -> dict[str, Any]:
@@ -304,10 +400,11 @@ def calibrate(
     return response_of(found[0], sensors[0]) | ({} if force_N else {"force_scale": 0.0, "force_scale_sd": 0.0})
 
 
-def read_table(path: str, sensors: int, first: int | None = None, time: int | None = None) -> tuple[FloatArray, FloatArray | None]:
-    """(pressures [row, sensor], time [row] or None) of a text file with comma, semicolon, tab or blanks between cells; what is before the first row of
-    numbers is a head. first, time: columns counted from 1. Raises InputError, which names the line."""
+def read_numbers(path: str) -> tuple[list[str], FloatArray]:
+    """(cells of the last line before the first row of numbers, rows) of a text file with comma, semicolon, tab or blanks between cells. Raises
+    InputError, which names the line."""
     rows: list[list[float]] = []
+    head: list[str] = []
     count = 0
     try:
         text = sys.stdin.read() if path == "-" else pathlib.Path(path).read_text(encoding="utf-8-sig", errors="replace")
@@ -322,6 +419,7 @@ def read_table(path: str, sensors: int, first: int | None = None, time: int | No
         except ValueError as error:
             if rows:
                 raise InputError(f"{path}:{number}: {error}; where a sensor has none, leave the cell empty") from None
+            head = cells
             continue
         if rows and len(values) != count:
             raise InputError(f"{path}:{number}: {len(values)} cells, and {count} before")
@@ -329,40 +427,61 @@ def read_table(path: str, sensors: int, first: int | None = None, time: int | No
         rows.append(values)
     if not rows:
         raise InputError(f"{path}: no row of numbers in it")
+    return head, np.array(rows)
+
+
+def read_table(path: str, sensors: int, first: int | None = None, time: int | None = None) -> tuple[FloatArray, FloatArray | None]:
+    """(pressures [row, sensor], time [row] or None) of such a file. first, time: columns counted from 1. Raises InputError, and warns of columns that
+    look like others."""
+    head, table = read_numbers(path)
+    count = table.shape[1]
     begin = count - sensors if first is None else first - 1
     if begin < 0 or begin + sensors > count or (first is None and begin > 1) or not 0 <= (time or 1) - 1 < count:
         raise InputError(
             f"{path}: {count} columns, and the pad has {sensors} sensors; give their columns, or the time and those, or --first N, the column of "
             "sensor 0, and --time N"
         )
-    table = np.array(rows)
     column = time if time is not None else 1 if first is None and begin == 1 else None
+    if time is None and column and not (np.diff(table[:, 0]) > 0).all():
+        raise InputError(f"{path}: column 1 of {count} would be the time, and does not rise; give --first N, the column of sensor 0")
+    for at in range(begin, begin + sensors):
+        name = head[at].strip(" \"'") if len(head) == count else ""
+        if NO_PRESSURE.fullmatch(name) or _rises(table[:, at]):
+            wrong = f'is "{printable(name)}", no pressure' if name else "rises evenly, as a time or a row's number"
+            raise InputError(f"{path}: column {at + 1}, of sensor {at - begin}, {wrong}; --first N is the column of sensor 0")
+        if len(table) > 1 and np.ptp(table[:, at]) == 0.0:
+            _warn(f"column {at + 1}, of sensor {at - begin}, never changes; leave its cells empty if the sensor is dead")
+    times = [at + 1 for at in range(count) if column is None and _rises(table[:, at])]
+    if times:
+        _warn(f"column {times[0]} rises evenly: a time? Give --time {times[0]}; without it each row is a held contact")
     return table[:, begin : begin + sensors], None if column is None else table[:, column - 1]
+
+
+def _rises(values: FloatArray) -> bool:
+    """Evenly, but for gaps."""
+    steps = np.diff(values)
+    return len(steps) >= 8 and bool((steps > 0).all() and np.quantile(steps, 0.9) < 1.5 * np.quantile(steps, 0.1))
 
 
 def main(argv: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="fingertip fit", description=(__doc__ or "").split(":")[0] + ".", allow_abbrev=False)
-    parser.add_argument(
-        "file",
-        metavar="FILE.csv",
-        help="a column for each sensor, in the pad's order, and perhaps one of the time before; -: standard input",
-    )
+    parser.add_argument("file", metavar="FILE.csv", help="a column for each sensor, and perhaps one of the time before; -: standard input")
     parser.add_argument("--pad", required=True, metavar="NAME|FILE.json", help="one of the tool's pads, or a file that describes it")
     parser.add_argument("--first", type=int, metavar="N", help="column of sensor 0, counted from 1; the others follow it")
     parser.add_argument("--time", type=int, metavar="N", help="column of the time in seconds; without one each row is a contact of its own")
     parser.add_argument("--unit", default="Pa", metavar="UNIT", help=f"{', '.join(UNITS)}; default: Pa")
     parser.add_argument(
-        "--zero", type=int, default=0, metavar="ROWS", help="so many rows at the beginning are at rest, and their mean is the zero"
+        "--zero", type=int, default=0, metavar="ROWS", help="number of rows at rest at the beginning: their mean is the zero"
     )
     parser.add_argument("--noise", type=float, default=NOISE_Pa, metavar="PA", help="of a reading, rms; default: %(default)g")
     parser.add_argument("--calibration", metavar="FILE.json", help="what --calibrate wrote")
-    parser.add_argument(
-        "--calibrate", action="store_true", help="find the sensors' gains instead, of rows in which one weight stands at different places"
-    )
+    parser.add_argument("--calibrate", action="store_true", help="find the sensors' gains instead, of one weight at different places")
     parser.add_argument("--weight", type=float, metavar="GRAMS", help="its mass: then forces are calibrated too")
     parser.add_argument("-o", "--output", metavar="FILE", help="default: standard output")
     parser.add_argument("--overwrite", action="store_true", help="replace it if it exists")
     options = parser.parse_args(argv)
+    say = reporter(parser.prog)
+    warnings.showwarning = lambda message, *_: say(f"warning: {message}")
     if options.output and os.path.exists(options.output) and not options.overwrite:
         raise InputError(f"{options.output}: exists already; give --overwrite to replace it")
     pressures, time_s = read_table(options.file, len(read_pad(options.pad).x_mm), options.first, options.time)
@@ -373,14 +492,15 @@ def main(argv: list[str]) -> int:
     else:
         found = fit(pressures, options.pad, calibration=options.calibration, time_s=time_s, **common)
         columns = ({} if time_s is None else {"t_s": time_s}) | found
-        text = "".join(f"{','.join(cells)}\n" for cells in [columns, *zip(*(_texts(values) for values in columns.values()))])
+        text = "".join(f"{','.join(cells)}\n" for cells in [columns, *zip(*(_texts(values, name) for name, values in columns.items()))])
     write_text(options.output, text) if options.output else sys.stdout.write(text)
     return 0
 
 
-def _texts(values: npt.NDArray[Any]) -> list[str]:
+def _texts(values: npt.NDArray[Any], name: str) -> list[str]:
     """Empty where there is none."""
-    return [("" if value != value else f"{value:.9g}") if isinstance(value, float) else str(value) for value in values.tolist()]
+    texts = (repr(value) if name == "t_s" or isinstance(value, int) else f"{value:.9g}" for value in values.tolist())
+    return ["" if text == "nan" else text for text in texts]
 
 
 def command() -> int:

@@ -158,18 +158,12 @@ class Contacts(Measure):
         frame has a fit."""
         readings_Pa = self.readings_Pa(base_Pa, pads, noise_Pa, normals)
         saturated = ((readings_Pa > self.max_pressure_Pa - AMBIENT_Pa) << np.arange(SENSORS)).sum(axis=2).astype(np.uint32)
-        if usable is not None:
-            usable = np.repeat(usable[:, None], saturated.shape[1], axis=1).astype(np.uint32)
         settings, own = self.settings_of(pads, noise_Pa), self.own_of(pads)
         fits, estimates = self.tangential(self.own_array, profile, settings, q10(readings_Pa), usable, saturated, own=own)
-        published = self.made("published", len(base_Pa))
-        self.call(
-            "publish",
-            profile,
-            np.ascontiguousarray(pads["force_scale"]),
-            *(np.ascontiguousarray(each[:, -1]) for each in (fits, estimates)),
-            published,
-        )
+        published, exact = self.made("published", len(base_Pa)), profile.copy()
+        exact["tangential_scale_sd"] = 0.0
+        last = (np.ascontiguousarray(each[:, -1]) for each in (fits, estimates))
+        self.call("publish", exact, np.ascontiguousarray(pads["force_scale"]), 0.0, *last, published)
         found = (fits["flags"] & FIT_VALID > 0).all(axis=1)
         published[~found] = 0
         return published, found
@@ -182,7 +176,8 @@ class Contacts(Measure):
         found = self.made("fit_shapes_result", len(readings_Pa), 2), self.made("shapes_place", len(readings_Pa), 2)
         settings = self.settings_of(pads, noise_Pa)
         settings["past_sd_Pa_q10"][:, :SENSORS] = q10(past_sd_Pa)
-        self.call("held_shapes", self.own_array, pad, settings, self.no_own if own is None else own, q10(readings_Pa), published, *found)
+        readings = q10(readings_Pa), self.usable(readings_Pa), published
+        self.call("held_shapes", self.own_array, pad, settings, self.no_own if own is None else own, *readings, *found)
         return found
 
     def motion_flags(self, ends, t_us, readings_Pa, pads, noise_Pa, pressed, profile):

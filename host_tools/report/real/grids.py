@@ -4,13 +4,12 @@ The sensors are in two columns of four; the board's drawing gives the pitch. The
 shift. Every second row of presses aligns the layout and gives placements for calibrations; the figures are of the other rows.
 """
 
-import csv
 import dataclasses
 
 import fingertip
 import numpy as np
 from fingertip.files import InputError
-from fingertip.fit import inputs, read_pad, response_of
+from fingertip.fit import inputs, read_numbers, read_pad, response_of
 from fingertip.line import WARNINGS, Flag
 
 PA_PER_PSI = 6894.757
@@ -30,16 +29,9 @@ class Grid:
     """One recording. xy [press, 2] in mm of the layout's frame, reading_Pa [press, 8], judged [press]: not of a row that aligns."""
 
     def __init__(self, path, pitch_mm):
-        rows = []
-        with open(path, encoding="utf-8") as lines:
-            for cells in csv.reader(lines):
-                try:
-                    rows.append([float(cell) for cell in cells])
-                except ValueError:
-                    continue  # the header
-        if not rows or {len(row) for row in rows} != {10}:
+        _, table = read_numbers(path)
+        if table.shape[1] != 10:
             raise InputError(f"{path}: rows are not x, y and eight readings")
-        table = np.array(rows)
         stage, self.reading_Pa = table[:, :2], table[:, 2:] * PA_PER_PSI
         self.pitch_mm = pitch_mm
         up = (np.arange(4) - 1.5) * pitch_mm

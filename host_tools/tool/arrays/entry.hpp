@@ -1,4 +1,4 @@
-// How measure.py calls C++: arrays in, arrays out, all of them the caller's.
+// How Python's fingertip.arrays calls C++: arrays in, arrays out, all of them the caller's.
 //
 // An entry point is one function and one line:
 //
@@ -26,7 +26,7 @@
 #include <utility>
 #include <vector>
 
-// As measure.py fills it in.
+// As fingertip.arrays fills it in.
 struct measure_argument {
   void *data; // of an array or a text
   std::int64_t shape[4];

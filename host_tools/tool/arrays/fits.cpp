@@ -1,7 +1,6 @@
 // The firmware's fit on many presses, of any layout.
 #include "libfingertip/in_parallel.hpp"
 #include "tool/arrays/fit_arguments.hpp"
-#include "tool/arrays/stopwatch.hpp"
 
 extern "C" {
 #include "config/defaults.h"
@@ -9,6 +8,8 @@ extern "C" {
 #include "fit/fit.h"
 #include "fit/fit_doubt.h"
 }
+
+#include <ctime>
 
 using namespace fingertip::measure;
 using fingertip::twin::in_parallel;
@@ -81,7 +82,7 @@ static void fit(std::string kernel, std::int64_t threads, Batch<const fit_array,
   same_length(results, pressure_Pa_q10, usable);
   length_or_one(results, all_settings);
   const Kernel run = kernel_named(kernel);
-  const Stopwatch watch;
+  const std::clock_t begun = std::clock(); // of this process: what others run meanwhile does not count
   in_parallel(
       results.size(),
       [&](std::size_t press) {
@@ -89,26 +90,27 @@ static void fit(std::string kernel, std::int64_t threads, Batch<const fit_array,
         run(array, pressure_Pa_q10.row(press), usable[press], &settings, results.row(press));
       },
       static_cast<std::size_t>(threads));
-  us[0] = watch.us() / static_cast<double>(results.size());
+  us[0] = 1e6 * static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC / static_cast<double>(results.size());
 }
 MEASURE_ENTRY(fit)
 
 // Fit of held presses [press][frame][sensor]: that of the last frame, with what the search for a tangential force that
 // is not estimated has found in the frames before. A single frame is not searched.
 static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
-                     Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const std::uint32_t, 1> usable, Batch<fit_result, 1> results) {
+                     Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const std::uint32_t, 2> usable, Batch<fit_result, 1> results) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   same_length(results, pressure_Pa_q10, usable);
   length_or_one(results, all_settings);
+  const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
+  require(usable.size(1) == frames, "other numbers of frames");
   in_parallel(results.size(), [&](std::size_t press) {
     const fit_settings settings = settings_of(all_settings, own, press);
-    const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
     const std::int32_t *pressure = pressure_Pa_q10.row(press);
-    fit_gaussian(array, pressure, usable[press], &settings, &results[press]);
+    fit_gaussian(array, pressure, usable.row(press)[0], &settings, &results[press]);
     fit_doubt doubt{};
     for (std::size_t i = 1; i < frames; i++, pressure += sensors) {
       fit_doubt_follow(&doubt, array, pressure, &settings, &results[press]);
-      fit_gaussian(array, pressure + sensors, usable[press], &settings, &results[press]);
+      fit_gaussian(array, pressure + sensors, usable.row(press)[i], &settings, &results[press]);
     }
     if (frames > 1) {
       fit_doubt_widen(&doubt, array, &settings, &results[press]);

@@ -33,10 +33,12 @@ struct firmware_constants {
   std::int32_t zero_tare_frames, default_fit_iterations;
   std::int32_t tangential_frames, shapes_frames;                           // until the first answer
   double gate_open_Pa, gate_open_noises, gate_close_Pa, gate_close_noises; // of the largest reading
+  double default_force_scale_sd;
 };
 MEASURE_RECORD(firmware_constants, FIELD(sensor_max_pressure_Pa), FIELD(default_gain_sd), FIELD(default_model_sd),
                FIELD(location_sd_limit_mm), FIELD(zero_tare_frames), FIELD(default_fit_iterations), FIELD(tangential_frames),
-               FIELD(shapes_frames), FIELD(gate_open_Pa), FIELD(gate_open_noises), FIELD(gate_close_Pa), FIELD(gate_close_noises))
+               FIELD(shapes_frames), FIELD(gate_open_Pa), FIELD(gate_open_noises), FIELD(gate_close_Pa), FIELD(gate_close_noises),
+               FIELD(default_force_scale_sd))
 
 static void constants_of_build(Batch<firmware_constants, 1> constants) {
   constants[0] = {static_cast<double>(MS58XX_MAX_PRESSURE_Pa),
@@ -50,7 +52,8 @@ static void constants_of_build(Batch<firmware_constants, 1> constants) {
                   GATE_OPEN_Pa,
                   GATE_OPEN_SIGMA,
                   GATE_CLOSE_Pa,
-                  GATE_CLOSE_SIGMA};
+                  GATE_CLOSE_SIGMA,
+                  static_cast<double>(DEFAULT_FORCE_SCALE_SD)};
 }
 MEASURE_ENTRY(constants_of_build)
 

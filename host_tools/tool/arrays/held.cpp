@@ -20,20 +20,22 @@ using fingertip::twin::in_parallel;
 struct published {
   bool valid, elongated; // the latter as the Gaussian fit flags it
   double x_mm, y_mm, location_sd_mm, force_N;
+  double force_sd_N;   // of the estimate
   double qx, qy, q_sd; // per normal force
   double gaussian_x_mm, gaussian_y_mm, gaussian_force_N;
 };
-MEASURE_RECORD(published, FIELD(valid), FIELD(elongated), FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm), FIELD(force_N), FIELD(qx),
-               FIELD(qy), FIELD(q_sd), FIELD(gaussian_x_mm), FIELD(gaussian_y_mm), FIELD(gaussian_force_N))
+MEASURE_RECORD(published, FIELD(valid), FIELD(elongated), FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm), FIELD(force_N),
+               FIELD(force_sd_N), FIELD(qx), FIELD(qy), FIELD(q_sd), FIELD(gaussian_x_mm), FIELD(gaussian_y_mm), FIELD(gaussian_force_N))
 
-// force_scale: 0 of a pad that is not calibrated. Scales are exact.
-static published published_of(const pad_profile &profile, double force_scale, const fit_result &fit, const fit_tangential &estimate) {
+// force_scale: 0 of a pad that is not calibrated.
+static published published_of(const pad_profile &profile, double force_scale, double force_scale_sd, const fit_result &fit,
+                              const fit_tangential &estimate) {
   contact_settings scales{};
   const double scale = force_scale > 0.0 ? force_scale : 1.0;
   scales.force_scale = static_cast<float>(scale);
+  scales.force_scale_sd = static_cast<float>(force_scale_sd);
   tangential_settings settings{};
   tangential_use(&settings, &profile, &scales, force_scale > 0.0);
-  settings.tangential_scale_sd = 0.0F;
   contact_input input{};
   input.contact = true;
   input.fit = &fit;
@@ -54,6 +56,7 @@ static published published_of(const pad_profile &profile, double force_scale, co
     found.y_mm = number(load.y_mm);
     found.location_sd_mm = number(load.location_sd_mm);
     found.force_N = number(load.force_N);
+    found.force_sd_N = number(load.force_sd_N);
     found.qx = number(load.qx_N) / found.force_N;
     found.qy = number(load.qy_N) / found.force_N;
     found.q_sd = number(load.q_sd_N) / found.force_N;
@@ -67,12 +70,12 @@ static published published_of(const pad_profile &profile, double force_scale, co
 }
 
 // All zeros where there is no fit.
-static void publish(Batch<const pad_profile, 1> profile, Batch<const double, 1> force_scale, Batch<const fit_result, 1> fits,
-                    Batch<const fit_tangential, 1> estimates, Batch<published, 1> found) {
+static void publish(Batch<const pad_profile, 1> profile, Batch<const double, 1> force_scale, double force_scale_sd,
+                    Batch<const fit_result, 1> fits, Batch<const fit_tangential, 1> estimates, Batch<published, 1> found) {
   same_length(found, force_scale, fits, estimates);
   for (std::size_t i = 0; i < found.size(); i++) {
     const bool has_fit = (fits[i].flags & CONTACT_FLAG_FIT_VALID) != 0;
-    found[i] = has_fit ? published_of(profile[0], force_scale[i], fits[i], estimates[i]) : published{};
+    found[i] = has_fit ? published_of(profile[0], force_scale[i], force_scale_sd, fits[i], estimates[i]) : published{};
   }
 }
 MEASURE_ENTRY(publish)
@@ -97,12 +100,13 @@ MEASURE_RECORD(shapes_place, FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm))
 // The shapes, as scene grasp has them, of contacts [contact][frame][sensor] that are held: after FIT_SHAPES_FRAMES
 // frames the first answer, and the last. Where the tangential force is estimated, its location is used.
 static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes_pad, 1> pad, Batch<const fit_settings, 1> all_settings,
-                        Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const published, 1> estimates,
-                        Batch<fit_shapes_result, 2> results, Batch<shapes_place, 2> places) {
+                        Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const std::uint32_t, 2> usable,
+                        Batch<const published, 1> estimates, Batch<fit_shapes_result, 2> results, Batch<shapes_place, 2> places) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
-  same_length(results, places, pressure_Pa_q10, estimates);
-  require(results.size(1) == 2 && places.size(1) == 2 && frames > FIT_SHAPES_FRAMES, "too few frames or answers");
+  same_length(results, places, pressure_Pa_q10, usable, estimates);
+  require(results.size(1) == 2 && places.size(1) == 2 && frames > FIT_SHAPES_FRAMES && usable.size(1) == frames,
+          "too few frames or answers");
   in_parallel(results.size(), [&](std::size_t contact) {
     const auto job = std::make_unique<shapes_job>();
     job->array = array;
@@ -119,7 +123,7 @@ static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes
     for (std::size_t i = 0; i < frames; i++) {
       std::copy_n(pressure_Pa_q10.row(contact) + i * sensors, sensors, question.pressure_Pa_q10);
       question.begins = i == 0;
-      fit_gaussian_grid(array, question.pressure_Pa_q10, (1u << sensors) - 1u, &question.settings, &question.fit);
+      fit_gaussian_grid(array, question.pressure_Pa_q10, usable.row(contact)[i], &question.settings, &question.fit);
       shapes_estimate(job.get());
       fit_doubt_follow(&doubt, array, question.pressure_Pa_q10, &question.settings, &question.fit);
       const bool last = i == frames - 1;

@@ -82,6 +82,29 @@ class Fit(unittest.TestCase):
         found = fingertip.fit(readings_Pa, "2x4")
         self.assertTrue((found["flags"] & Flag.SENSOR_MASKED > 0).all() and (found["sensors_used"] & 8 == 0).all())
         self.assertLess(off_mm(found, x_mm, y_mm), 0.3)
+        described = {"pitch_mm": 9, "columns": 4, "rows": 4, "rubber": RUBBER}
+        readings_Pa = presses(read_pad(described), 40, SIGMA_mm)[2]
+        readings_Pa[:, 5] = np.nan
+        found = fingertip.fit(readings_Pa, described)  # a zero there would be a dent, which no one contact makes
+        self.assertLess((found["flags"] & (Flag.SHAPE_UNKNOWN | Flag.TWO_CONTACTS) > 0).mean(), 0.1)
+
+    def test_flags_and_standard_deviations_are_those_of_the_chip(self):
+        described = {"pitch_mm": 9, "columns": 4, "rows": 4}
+        pad, pull = read_pad(described), responses(read_pad(described), [-7.3], [2.0], 1.27 * SIGMA_mm)
+        pulled_Pa = 3000.0 * responses(pad, [-9.4, -7.3, -5.2], [2.0] * 3, SIGMA_mm).sum(axis=0) - 2500.0 * (pad.x_mm + 7.3) / 9 * pull
+        for of_pad in (described, described | {"rubber": RUBBER}):
+            with self.subTest(of_pad=of_pad):
+                plain, exact, known = (
+                    fingertip.fit(pulled_Pa, of_pad, calibration={"gain_sd": [0.02] * 16, "force_scale": scale, "force_scale_sd": sd})
+                    for scale, sd in ((0.0, 0.0), (2.0, 0.0), (2.0, 0.2))
+                )
+                estimated, flags = "rubber" in of_pad, int(known["flags"][0])
+                self.assertEqual(flags ^ plain["flags"][0], Flag.CALIBRATED)
+                there = [bool(flags & flag) for flag in (Flag.CONTACT, Flag.ELONGATED, Flag.TANGENTIAL_VALID)]
+                self.assertEqual(there, [True, not estimated, estimated])
+                wanted_N = np.hypot(exact["force_sd_N"], known["force_N"] * 0.1)
+                np.testing.assert_allclose(known["force_sd_N"], wanted_N, rtol=2e-3)  # bits of fit_quadrature()
+        self.assertGreater(known["q_sd_N"][0], 0.1 * abs(known["qx_N"][0]))  # the scale of silicone that nobody has pulled
 
     def test_rows_with_a_time_are_contacts_by_the_gate(self):
         t_s = 0.01 * np.arange(300)
@@ -91,7 +114,7 @@ class Fit(unittest.TestCase):
         found = fingertip.fit(readings_Pa, "2x4", time_s=t_s, zero_rows=40)
         np.testing.assert_array_equal(np.isfinite(found["x_mm"]), pressed)
         self.assertLess(off_mm({name: found[name][pressed] for name in found}, x_mm[pressed], 0.0), 0.05)
-        self.assertEqual(found["flags"][~pressed].max(), 0)
+        self.assertEqual(set(found["flags"][~pressed].tolist()), {int(Flag.TARED)})
 
     def test_a_calibration_brings_places_and_forces_nearer(self):
         gains = np.exp(0.15 * np.random.default_rng(3).normal(size=8))
@@ -104,7 +127,20 @@ class Fit(unittest.TestCase):
 
     def test_what_cannot_be_is_refused_with_its_cause(self):
         readings_Pa = presses(PAD, 10, 4.5)[2]
+        t_s, rest_Pa = 0.01 * np.arange(20), 5.0 * np.random.default_rng(1).normal(size=(10, 8))
+        series_Pa = np.vstack([rest_Pa, readings_Pa])
         for values, pad, more, words in (
+            (1013 + series_Pa / 100, "2x4", {"zero_rows": 8}, "1013 Pa, as the air's in hPa or mbar; give that unit"),
+            (series_Pa, "2x4", {"zero_rows": 15}, "in the 15 rows at rest: something touches"),
+            (series_Pa - readings_Pa[3], "2x4", {}, "the zero is that of a press"),
+            (readings_Pa, "2x4", {"zero_rows": 11}, "give rows that are there"),
+            (readings_Pa, "2x4", {"noise_Pa": 0.0}, "and noise above 0"),
+            (readings_Pa, "2x4", {"calibration": {"gain": [0.0] * 8}}, "gain is \\[0.0"),
+            (readings_Pa, "2x4", {"calibration": {"gain": "high"}}, "gain has 1 values"),
+            (readings_Pa, "2x4", {"calibration": {"gains": []}}, "has none of sigma_mm"),
+            (readings_Pa, "2x4", {"calibration": {"force_scale": 1.0}}, "without its standard deviation"),
+            (readings_Pa, "2x4", {"calibration": "/"}, "/: Is a directory"),
+            (readings_Pa, "2x4", {"calibration": __file__}, "test_fit.py: no JSON"),
             (readings_Pa[:, :7], "2x4", {}, "10 x 7, and pad 2x4 has 8 sensors"),
             (readings_Pa, "2x5", {}, "no such pad; give 2x4, 3x5, 4x4"),
             (readings_Pa, {"columns": 2, "rows": 4}, {}, "KeyError 'pitch_mm'"),
@@ -114,10 +150,19 @@ class Fit(unittest.TestCase):
             (readings_Pa + 1e5, "2x4", {}, "as the air's"),
             (readings_Pa * np.nan, "2x4", {}, "none is a number"),
             (readings_Pa, "2x4", {"time_s": np.zeros(10)}, "time does not rise"),
-            (readings_Pa, "2x4", {"calibration": {"gain": [1.0] * 7}}, "gain of the calibration has 7 values"),
+            (readings_Pa, "2x4", {"calibration": {"gain": [1.0] * 7}}, "gain has 7 values"),
         ):
             with self.subTest(words), self.assertRaisesRegex(fingertip.InputError, words):
                 fingertip.fit(values, pad, **more)
+        lost_s = t_s + 0.2 * (t_s > 0.15)
+        for values, more, words in (
+            (series_Pa + 5 * np.vstack([rest_Pa, rest_Pa]), {"zero_rows": 10}, "readings scatter by 2. Pa from row to row"),
+            (series_Pa / 100, {"noise_Pa": 1.0}, "that of a few grams"),
+            (series_Pa, {"time_s": lost_s}, "rows are lost at 1 places, the longest of 0.21 s before row 17"),
+            (series_Pa[10:], {"time_s": t_s[:10]}, "the first row is touched"),
+        ):
+            with self.subTest(words), self.assertWarnsRegex(UserWarning, words):
+                fingertip.fit(values, "2x4", **more)
 
     def test_the_command_does_the_same_from_a_file(self):
         x_mm, y_mm, readings_Pa = presses(PAD, 30, 4.5)
@@ -138,6 +183,19 @@ class Fit(unittest.TestCase):
             self.assertIn("10 columns, and the pad has 8 sensors", run("--pad", "2x4", status=1))
             run(*right, "-o", out)
             self.assertIn("--overwrite", run(*right, "-o", out, status=1))
+            for head, columns, options, words in (
+                ("x,y", np.c_[x_mm, x_mm, readings_Pa], ("--first", "2"), 'column 2, of sensor 0, is "y", no pressure; --first N'),
+                ("", np.c_[readings_Pa, x_mm], (), "column 1 of 9 would be the time, and does not rise; give --first N"),
+                ("", np.c_[x_mm, np.arange(30), readings_Pa], ("--first", "2"), "column 2, of sensor 0, rises evenly"),
+                ("", np.c_[np.arange(30), readings_Pa], ("--first", "2"), "warning: column 1 rises evenly: a time? Give --time 1"),
+                ("", np.c_[readings_Pa[:, :7], np.zeros(30)], (), "warning: column 8, of sensor 7, never changes"),
+            ):
+                named = [head + ",p" * (columns.shape[1] - 2)] if head else []
+                pathlib.Path(path).write_text("\n".join([*named, *(",".join(map(repr, row)) for row in columns.tolist())]))
+                refused = "warning" not in words
+                self.assertIn(f"fingertip fit: {(path + ': ') * refused}{words}", run("--pad", "2x4", *options, status=refused))
+            pathlib.Path(path).write_text("\n".join(f"{1.7e9 + k / 1000!r},{line.split(',', 2)[2]}" for k, line in enumerate(lines)))
+            self.assertIn("\n1700000000.029,", run("--pad", "2x4", "--unit", "kPa"))
             pathlib.Path(path).write_text("\n".join([lines[0], lines[1] + ",1"]))
             self.assertIn(":2: 11 cells, and 10 before", run(*right, status=1))
             pathlib.Path(path).write_text("\n".join([lines[0], lines[1] + "x"]))
