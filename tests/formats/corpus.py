@@ -193,11 +193,8 @@ def csv_cases(corpus, name, text, devices):
     add("empty", b"")
     add("header_twice", [*lines[: header + 1], *lines[header:]])
     add("two_ends", [*lines, lines[-1]])
-    for format_ in ("0", "3", "01", "1.0", "1 2", "", "\u0661"):
-        add(
-            f"format_{format_.replace(' ', '_').encode('ascii', 'replace').decode()}",
-            [lines[0].rsplit(" ", 1)[0] + " " + format_, *lines[1:]],
-        )
+    for number, format_ in enumerate(("0", "3", "01", "1.0", "1 2", "", "\u0661")):
+        add(f"format_{number}", [f"{lines[0].rsplit(' ', 1)[0]} {format_}", *lines[1:]])
     add("scenario", ["# fingertip-scenario 1", *lines[1:]])
     add("other_text", ["hello", *lines[1:]])
     add("first_line_blanks", [lines[0] + "  ", *lines[1:]])
@@ -228,11 +225,9 @@ def csv_cases(corpus, name, text, devices):
         add(f"comment_{number}", [*lines[:row], own, *lines[row:]])
         add(f"head_{number}", [*lines[:header], own, *lines[header:]])
     prng = random.Random(name)
+    words = (b"", b"\r\n", b",,", b"-0", b"1e3", b"#", b"\n\n", b" ", b"\xb5", b": ", b"/", b"9", b"=")
     for chance in range(CHANCES):
-        add(
-            f"chance_{chance}",
-            damaged(text, prng, (b"", b"\r\n", b",,", b"-0", b"1e3", b"#", b"\n\n", b" ", b"\xb5", b": ", b"/", b"9", b"=")),
-        )
+        add(f"chance_{chance}", damaged(text, prng, words))
 
 
 def without_flags(header, row):
@@ -266,31 +261,13 @@ def joint_cases(corpus, text):
     add("no_devices", [line for line in lines if not line.startswith("# devices")])
     add("devices_late", [*lines[:1], *lines[2:], lines[1]])
     add("header_of_one", [line.removeprefix("device,time_us,") if at == header else line for at, line in enumerate(lines)])
-    for what, change in {
-        "device_00": ("0,", "00,"),
-        "device_5": ("0,", "5,"),
-        "no_time": ("0,1000.5,", "0,,"),
-        "time_word": ("0,1000.5,", "0,noon,"),
-        "time_infinite": ("0,1000.5,", "0,inf,"),
-        "time_back": ("1,2000.5,", "1,-2000.5,"),
-        "two_cells": ("0,1000.5,41177,", "0,1000.5#"),
-        "other_broken": ("1,2000.5,2990954", "1,2000.5,x"),
-        "one_cell": ("0,1000.5,41177", "0"),
-    }.items():
-        add(what, [line.replace(*change, 1) if line.startswith(change[0]) else line for line in lines])
-    for what, comment in {
-        "own_end": "# 0/end: frames",
-        "others_end": "# 1/end: frames",
-        "end": "# end: frames",
-        "number": "# 9/event: x",
-        "zeros": "# 00/event: x",
-        "of_all": "# event: x",
-        "key_with_slash": "# 0/a/b: c",
-        "slash_in_value": "# note: 0/event: c",
-        "grip": "# grip: x",
-        "packet_of_all": "# packet: info sequence=1 t_us=1",
-    }.items():
-        add(f"comment_{what}", [*lines[: header + 1], comment, *lines[header + 1 :]])
+    changes = [("0,", "00,"), ("0,", "5,"), *(("0,1000.5,", f"0,{time},") for time in ("", "noon", "inf")), ("1,2000.5,", "1,-2000.5,")]
+    changes += [("0,1000.5,41177,", "0,1000.5#"), ("1,2000.5,2990954", "1,2000.5,x"), ("0,1000.5,41177", "0")]
+    for number, change in enumerate(changes):
+        add(f"row_{number}", [line.replace(*change, 1) if line.startswith(change[0]) else line for line in lines])
+    of_one = ("0/end: frames", "1/end: frames", "9/event: x", "00/event: x", "0/a/b: c")
+    for number, comment in enumerate((*of_one, "end: frames", "event: x", "note: 0/event: c", "grip: x", "packet: info sequence=1 t_us=1")):
+        add(f"comment_{number}", [*lines[: header + 1], f"# {comment}", *lines[header + 1 :]])
 
 
 def bag_of(
@@ -425,66 +402,36 @@ def message_cases(corpus, name, bag, devices):
     add("no_crc", enable_crcs=False)
     add("no_index", index_types=mcap.writer.IndexType.NONE, use_statistics=False, use_summary_offsets=False)
     add("large_chunks", lambda kind, row: [("std_msgs/Header", bytes(3_000_000)), (kind, row)], chunk=10**8)
-    for what, changes in {
-        "nan_under_its_flag": {"x_mm": nan},
-        "all_nan": {"x_mm": nan, "y_mm": nan, "force_n": nan},
-        "infinite": {"x_mm": inf},
-        "nan_without_flag": {"flags": 0, "x_mm": nan},
-        "value_without_flag": {"flags": 0, "x_mm": 3.5},
-        "time_infinite": {"time_us": inf},
-        "time_minus_infinite": {"time_us": -inf},
-        "time": {"time_us": 5.5},
-        "no_time": {"time_us": nan},
-        "time_huge": {"time_us": 1e300},
-        "device_7": {"device": 7},
-        "sensors_14": {"pressure_pa": pressures[:-1], "tare_pa": pressures[:-1]},
-        "sensors_16": {"pressure_pa": [*pressures, 0.0], "tare_pa": [*pressures, 0.0]},
-        "sensors_33": {"pressure_pa": 33 * [0.0], "tare_pa": 33 * [0.0]},
-        "no_sensors": {"pressure_pa": [], "tare_pa": []},
-        "fewer_pressures": {"pressure_pa": pressures[:-1]},
-        "fewer_zeros": {"tare_pa": pressures[:-1]},
-        "pressure_beyond": {"pressure_pa": [3e6, *pressures[1:]]},
-        "pressure_least": {"pressure_pa": [-2097152.0, *pressures[1:]]},
-        "pressure_nan": {"pressure_pa": [nan, *pressures[1:]]},
-        "pressure_half": {"pressure_pa": [0.00048828125, *pressures[1:]]},
-        "zero_beyond": {"tare_pa": [-3e6, *pressures[1:]]},
-        "temperature_beyond": {"temperature_degc": 400.0},
-        "temperature_nan": {"temperature_degc": nan},
-        "no_contact": {"has_contact": False},
-        "no_raw": {"has_raw": False},
-        "no_packet": {"has_contact": False, "has_raw": False},
-        "number_again": {"line": row["line"] - 1},
-        "number_far": {"line": row["line"] + 5},
-        "number_back": {"line": 1},
-        "number_0": {"line": 0},
-        "late_time": {"t_us": 2**53},
-    }.items():
-        add(f"message_{what}", lambda kind, row, changes=changes: [(kind, {**row, **changes})])
+    values = {
+        "x_mm": (nan, inf),
+        "time_us": (inf, -inf, 5.5, nan, 1e300),
+        "device": (7,),
+        "pressure_pa": (pressures[:-1], *([each, *pressures[1:]] for each in (3e6, -2097152.0, nan, 0.00048828125))),
+        "tare_pa": (pressures[:-1], [-3e6, *pressures[1:]]),
+        "temperature_degc": (400.0, nan),
+        "has_contact": (False,),
+        "has_raw": (False,),
+        "line": (row["line"] - 1, row["line"] + 5, 1, 0),
+        "t_us": (2**53,),
+    }
+    changes = [{name: value} for name, each in values.items() for value in each]
+    changes += [{"flags": 0, "x_mm": x_mm} for x_mm in (nan, 3.5)]
+    changes += [{"x_mm": nan, "y_mm": nan, "force_n": nan}, {"has_contact": False, "has_raw": False}]
+    changes += [
+        {"pressure_pa": each, "tare_pa": each} for each in (pressures[:-1], [*pressures, 0.0], 33 * [0.0], [])
+    ]  # other numbers of sensors
+    for number, change in enumerate(changes):
+        add(f"message_{'_'.join(change)}_{number}", lambda kind, row, change=change: [(kind, {**row, **change})])
     good = encode(CONTACT_TYPE, row)
-    for what, data in {
-        "torn": good[:-5],
-        "torn_early": good[:20],
-        "empty": b"",
-        "head_only": good[:4],
-        "big_endian": b"\0\0" + good[2:],
-        "longer": good + bytes(8),
-        "parameters": b"\0\3" + good[2:],
-    }.items():
-        add(f"message_{what}", lambda kind, row, data=data: [(kind, data)])
+    others = (b"\0\0" + good[2:], b"\0\3" + good[2:])  # big endian, with parameters
+    for number, data in enumerate((good[:-5], good[:20], b"", good[:4], good + bytes(8), *others)):
+        add(f"message_bytes_{number}", lambda kind, row, data=data: [(kind, data)])
     add("message_missing", lambda kind, row: [])
     add("message_twice", lambda kind, row: [(kind, row), (kind, row)])
     add("message_of_others", lambda kind, row: [("std_msgs/Header", b"\0\1\0\0nonsense"), (kind, row)])
     line = {"header": row["header"], "line": row["line"], "torn": False}
-    for what, text in {
-        "comment": "# note: x",
-        "row": "1,2,3",
-        "two_lines": "# note: a\nb",
-        "empty": "",
-        "blank": " ",
-        "umlaut": "# note: \u00e4",
-        "return": "# note: x\r",
-    }.items():
-        add(f"line_{what}", lambda kind, row, text=text: [(LINE_TYPE, {**line, "text": text})])
+    for number, text in enumerate(("# note: x", "1,2,3", "# note: a\nb", "", " ", "# note: \u00e4", "# note: x\r")):
+        add(f"line_text_{number}", lambda kind, row, text=text: [(LINE_TYPE, {**line, "text": text})])
     add("line_torn", lambda kind, row: [(LINE_TYPE, {**line, "text": "# note: x", "torn": True})])
     add("line_torn_empty", lambda kind, row: [(LINE_TYPE, {**line, "text": "", "torn": True})])
     plain = encode(LINE_TYPE, {**line, "text": "# note: x"})
@@ -519,15 +466,8 @@ def bag_cases(corpus, name, content, devices, chances):
     for chunk in (chunks[0], chunks[-1]):
         start, end = chunk.chunk_start_offset, chunk.chunk_start_offset + chunk.chunk_length
         number = chunks.index(chunk)
-        for what, at in {
-            "begin": start,
-            "opcode": start + 1,
-            "length": start + 5,
-            "middle": (start + end) // 2,
-            "one_short": end - 1,
-            "end": end,
-        }.items():
-            add(f"cut_{number}_{what}", content[:at])
+        for at in (start, start + 1, start + 5, (start + end) // 2, end - 1, end):
+            add(f"cut_{number}_{at - start}", content[:at])
         add(f"without_chunk_{number}", content[:start] + content[end:])
         add(f"chunk_twice_{number}", content[:end] + content[start:])
         for what, at, data in (

@@ -228,26 +228,6 @@ void Writer::metadata(const std::string &name, const Pairs &pairs) {
   metadata_.push_back(record(METADATA_INDEX, index));
 }
 
-void Writer::attachment(std::uint64_t time_ns, const std::string &name, const std::string &media_type, const std::string &data) {
-  std::string content;
-  put_number(content, time_ns);
-  put_number(content, time_ns);
-  put_text(content, name);
-  put_text(content, media_type);
-  put_number(content, std::uint64_t{data.size()});
-  content += data;
-  put_number(content, crc_of(content));
-  std::string whole = record(ATTACHMENT, content), index;
-  put_number(index, append(whole));
-  put_number(index, std::uint64_t{whole.size()});
-  put_number(index, time_ns);
-  put_number(index, time_ns);
-  put_number(index, std::uint64_t{data.size()});
-  put_text(index, name);
-  put_text(index, media_type);
-  attachments_.push_back(record(ATTACHMENT_INDEX, index));
-}
-
 void Writer::message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data) {
   std::uint64_t passed_ns = time_ns > chunk_begin_ns_ ? time_ns - chunk_begin_ns_ : chunk_begin_ns_ - time_ns;
   if (!records_.empty() && (records_.size() >= CHUNK_bytes || passed_ns >= CHUNK_ns)) {
@@ -323,20 +303,16 @@ void Writer::finish() {
   }
   put_number(statistics, messages);
   put_number(statistics, static_cast<std::uint16_t>(schemas_.size()));
-  for (const auto *each : {&channels_, &attachments_, &metadata_, &chunks_}) {
-    put_number(statistics, static_cast<std::uint32_t>(each->size()));
+  for (const std::size_t count : {channels_.size(), std::size_t{0} /* of attachments */, metadata_.size(), chunks_.size()}) {
+    put_number(statistics, static_cast<std::uint32_t>(count));
   }
   span_.put(statistics);
   put_text(statistics, counts);
   const std::uint64_t start = length_ + data_end.size();
   std::string summary, offsets;
   const std::pair<Opcode, std::string> groups[] = {
-      {SCHEMA, joined(schemas_)},
-      {CHANNEL, joined(channels_)},
-      {STATISTICS, record(STATISTICS, statistics)},
-      {CHUNK_INDEX, joined(chunks_)},
-      {ATTACHMENT_INDEX, joined(attachments_)},
-      {METADATA_INDEX, joined(metadata_)},
+      {SCHEMA, joined(schemas_)},     {CHANNEL, joined(channels_)},        {STATISTICS, record(STATISTICS, statistics)},
+      {CHUNK_INDEX, joined(chunks_)}, {METADATA_INDEX, joined(metadata_)},
   };
   for (const auto &[opcode, group] : groups) {
     if (!group.empty()) {

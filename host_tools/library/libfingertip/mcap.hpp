@@ -46,7 +46,6 @@ public:
 
   /* Times are ns since 1970. */
   void metadata(const std::string &name, const Pairs &pairs);
-  void attachment(std::uint64_t time_ns, const std::string &name, const std::string &media_type, const std::string &data);
   /* Ends the chunk before it once that is a second long or a megabyte large. */
   void message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data);
   /* Content until now outlives the writer. */
@@ -66,7 +65,7 @@ private:
 
   Append append_;
   std::uint64_t length_ = 0;
-  std::vector<std::string> schemas_, channels_, attachments_, metadata_, chunks_;
+  std::vector<std::string> schemas_, channels_, metadata_, chunks_;
   std::map<std::uint16_t, std::uint64_t> counts_; /* of messages, by channel */
   Span span_;
 

@@ -18,6 +18,7 @@ constexpr const char *CONTACT = "fingertip_msgs/Contact";
 constexpr const char *LINE = "fingertip_msgs/Line";
 constexpr const char *PERIODIC_LINES = "/fingertip/lines/periodic"; /* those that each second has */
 constexpr const char *PRESSURES = "sensor_msgs/PointCloud2";
+constexpr std::uint64_t PERIOD_ns = 10'000'000;       /* each has the wrench, location and pressures of one row at most */
 constexpr std::size_t WAITING_MOST = 1 << 16;         /* lines for one before them, before it counts as lost: 50 s, 50 MB */
 constexpr std::uint64_t MESSAGE_MOST_bytes = 1 << 20; /* packed by itself */
 
@@ -62,18 +63,7 @@ static std::uint64_t shifted_ns(std::uint64_t ns, double by_us) {
   return std::min(ros::LATEST_ns, ns + static_cast<std::uint64_t>(std::min(by_ns, most)));
 }
 
-static bool is_list(const std::string &key) {
-  bool of_sensors = false;
-  auto visit = [&](const char *name, auto) { of_sensors = of_sensors || key == name; };
-  visit_sensor_lists(visit);
-  return of_sensors || std::any_of(std::begin(pad_lists), std::end(pad_lists), [&](const auto &each) { return key == each.name; });
-}
-
 static bool begins_with(const std::string &text, const char *begin) { return text.rfind(begin, 0) == 0; }
-
-static bool is_of_calibration(const std::string &key) {
-  return begins_with(key, "calibration_") || begins_with(key, "force_scale") || begins_with(key, "pad_") || is_list(key);
-}
 
 /* "# key: value" taken apart; nothing of other lines. */
 static std::optional<std::pair<std::string, std::string>> key_and_value(const std::string &text) {
@@ -90,23 +80,6 @@ static bool is_periodic(const std::string &text) {
   const auto pair = key_and_value(text);
   const std::string key = pair ? pair->first.substr(pair->first.find('/') + 1) : "";
   return key == "clock" || key == "grip" || (key == "packet" && begins_with(pair->second, PACKET_HEALTH));
-}
-
-static void set(mcap::Pairs &pairs, const std::string &key, const std::string &value) {
-  if (auto *found = find_in(pairs, [&](const auto &pair) { return pair.first == key; })) {
-    found->second = value;
-  } else {
-    pairs.emplace_back(key, value);
-  }
-}
-
-static std::string json(const std::string &serial, const mcap::Pairs &pairs) {
-  std::string text = "{\"serial\": \"" + serial + "\"";
-  for (const auto &[key, value] : pairs) {
-    const std::string numbers = joined(split(value, ' '), ", ");
-    text += ", \"" + key + "\": " + (is_list(key) ? "[" + numbers + "]" : value);
-  }
-  return text + "}";
 }
 
 /* UTF-8 without zeros; tabs and the end of a DOS line are none of the printable characters. */
@@ -206,8 +179,6 @@ void McapLineSink::device_key(Device &device, const std::string &key, const std:
     }
   } else if (key == "sensors") {
     device.sensors = static_cast<unsigned>(std::min<std::uint64_t>(to_u64(value).value_or(0), FT_MAX_SENSORS));
-  } else if (is_of_calibration(key)) {
-    set(device.calibration, key, value);
   }
 }
 
@@ -216,15 +187,15 @@ void McapLineSink::begin() {
   in_head_ = false;
   const auto head = std::move(head_);
   head_.clear();
-  mcap::Pairs keys;
+  std::map<std::string, std::string> keys;
   for (const auto &[text, torn] : head) {
     if (auto pair = key_and_value(text)) {
-      set(keys, pair->first, pair->second);
+      keys[pair->first] = pair->second;
     }
   }
   auto value = [&](const char *key) {
-    const auto *found = find_in(keys, [&](const auto &pair) { return pair.first == key; });
-    return found ? found->second : std::string();
+    const auto found = keys.find(key);
+    return found == keys.end() ? std::string() : found->second;
   };
   joint_ = head[0].first == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
   const std::string serials = value(joint_ ? "devices" : "serial");
@@ -245,13 +216,7 @@ void McapLineSink::begin() {
     has_rows_ = true;
   }
   clock_ = LogClock(value("started_utc"), value("started_device_us"));
-  writer_.metadata("fingertip_recording", keys);
-  for (const Device &device : devices_) {
-    if (!device.calibration.empty()) {
-      writer_.attachment(clock_.now_ns(), "calibration_" + device.serial + ".json", "application/json",
-                         json(device.serial, device.calibration));
-    }
-  }
+  writer_.metadata("fingertip_recording", {keys.begin(), keys.end()});
   std::map<std::string, std::uint16_t> schemas;
   for (const char *name :
        {CONTACT, LINE, "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped", PRESSURES, "diagnostic_msgs/DiagnosticArray"}) {
@@ -358,11 +323,12 @@ bool McapLineSink::put_row(const std::string &text) {
   Device &device = devices_[row.device];
   const ros::Header header = {clock_.now_ns(), device.frame_id};
   add(device.contact, ros::encode(header, row));
-  if (row.contact) {
+  const bool is_repeated = std::exchange(device.period, last_ns_ / PERIOD_ns) != last_ns_ / PERIOD_ns;
+  if (is_repeated && row.contact) {
     add(device.wrench, ros::wrench(header, row.contact->body.contact));
     add(device.place, ros::place(header, row.contact->body.contact));
   }
-  if (row.raw && std::min(device.x_mm.size(), device.y_mm.size()) >= sensor_count_) {
+  if (is_repeated && row.raw && std::min(device.x_mm.size(), device.y_mm.size()) >= sensor_count_) {
     add(device.pressures, ros::pressures(header, row.raw->body.raw, device.x_mm, device.y_mm));
   }
   if (row.contact) {
@@ -471,7 +437,9 @@ void McapLineSource::make_head(const mcap::Reader::Message &contact) {
   const std::uint8_t sensors = row && row->raw ? row->raw->body.raw.sensor_count : std::uint8_t{0};
   std::vector<std::string> lines = {std::string(FIRST_WORDS) + FORMAT_OF_ONE, "# serial: " + serial_in(topic_),
                                     "# sensors: " + std::to_string(sensors)};
-  const auto *cloud = find_in(reader_.together(), [](const auto &each) { return each.type == full_name(PRESSURES); });
+  const std::string beside = topic_.substr(0, topic_.rfind('/')) + "/pressures"; /* others, of cameras, have this type too */
+  const auto *cloud =
+      find_in(reader_.together(), [&](const auto &each) { return each.type == full_name(PRESSURES) && each.topic == beside; });
   for (std::size_t axis = 0; cloud && axis < 2; axis++) {
     lines.push_back(axis == 0 ? "# x_mm:" : "# y_mm:");
     for (double mm : ros::locations_mm(cloud->data, sensors, axis)) {

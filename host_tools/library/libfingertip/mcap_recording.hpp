@@ -53,7 +53,7 @@ private:
     std::vector<float> x_mm, y_mm;
     unsigned sensors = 0;
     std::optional<std::uint32_t> warnings; /* as last written */
-    mcap::Pairs calibration;
+    std::uint64_t period = UINT64_MAX;     /* of the messages that repeat a row */
   };
 
   void take(const std::string &text, bool torn);

@@ -22,16 +22,17 @@ import numpy.typing as npt
 
 from .errors import InputError
 from .frames import Q10
-from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, SENSORS_MAX
+from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX
 from .lines import LineFile, shortest
 from .messages import CONTACT_TYPE, DIAGNOSTICS_TYPE, FRAME_TOPICS, LINE_TYPE, PRESSURES_TYPE, TYPES, FrameMessages
 from .messages import diagnostics, health_status, name_in_ros, stamp
-from .recorded import LISTS, Array, Rows, header_text
+from .recorded import Array, Rows, header_text
 from .ros_messages import CDR_LITTLE_ENDIAN, PRIMITIVES, decode, encode, fields_of, schema_of
 
 LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can hold
 MAGIC = b"\x89MCAP0\r\n"
 CHUNK_ns = 1_000_000_000  # a chunk ends once it is that long, or has a megabyte
+PERIOD_ns = 10_000_000  # each has the wrench, location and pressures of one row at most
 CHUNK_MOST_bytes = 1 << 28  # of one that is read
 MESSAGE_MOST_bytes = 1 << 20  # of one that is packed by itself
 WAITING_MOST = 1 << 16  # lines that wait for one before them, before it counts as lost
@@ -108,31 +109,21 @@ class _Device:
 
     def __init__(self, number: int, serial: str) -> None:
         self.number = number
-        self.keys: dict[str, str] = {}
         self.serial = serial
         self.messages = FrameMessages(serial)
         self.channels: dict[str, int] = {}
+        self.period = -1
         self.x_mm: list[float] = []
         self.y_mm: list[float] = []
         self.sensors = 0
 
     def key(self, key: str, value: str) -> None:
-        self.keys[key] = value
         if key in ("x_mm", "y_mm"):
             setattr(self, key, [float(word) for word in value.split()])
         elif key == "sensors":
             self.sensors = int(value)
         if key in ("x_mm", "y_mm", "sensors"):
             self.messages.place_sensors(self.x_mm, self.y_mm, self.sensors)
-
-    def calibration(self) -> str:
-        """What there is of gains, force scale and pad, as JSON; nothing without."""
-        found = [
-            f'"{key}": ' + (f"[{', '.join(value.split())}]" if key in LISTS else value)
-            for key, value in self.keys.items()
-            if key.startswith(("calibration_", "force_scale", "pad_")) or key in SENSOR_LISTS
-        ]
-        return "{" + ", ".join([f'"serial": "{self.serial}"', *found]) + "}" if found else ""
 
 
 class McapLines:
@@ -191,14 +182,7 @@ class McapLines:
             if device:
                 device.key(own, value)
         self._clock = LogClock(keys)
-        now_ns = self._clock.last_ns
-        self._writer.add_metadata("fingertip_recording", keys)
-        for device in self._devices:
-            calibration = device.calibration()
-            if calibration:
-                self._writer.add_attachment(
-                    now_ns, now_ns, f"calibration_{device.serial}.json", "application/json", calibration.encode("utf-8")
-                )
+        self._writer.add_metadata("fingertip_recording", dict(sorted(keys.items())))
         for name in TYPES:
             self._schemas[name] = self._writer.register_schema(name.replace("/", "/msg/"), "ros2msg", schema_of(name).encode("utf-8"))
         self._channels = {
@@ -265,7 +249,9 @@ class McapLines:
             del cells[:2]
         row = contact_of(cells) | {"line": self._number, "device": device.number, "time_us": time_us}
         self._clock.row(row["t_us"], time_us)
-        for kind, data in device.messages.of(self._clock.last_ns, row):
+        period = max(self._log_ns, self._clock.last_ns) // PERIOD_ns
+        is_repeated, device.period = period != device.period, period
+        for kind, data in device.messages.of(self._clock.last_ns, row, is_repeated):
             self._add(device.channels[kind], data)
 
 
@@ -510,7 +496,7 @@ class McapLineReader:
         """Those that are wanted in a row of records. Raises ValueError, or what struct raises, where one of them is damaged."""
         wanted: list[tuple[str, str, bytes, int]] = []
         at, size, channels, unpack = 0, len(data), self._channels, struct.unpack_from
-        cloud = b""
+        clouds: dict[str, bytes] = {}
         while at < size:
             length = unpack("<Q", data, at + 1)[0]
             begin, end = at + 9, at + 9 + length
@@ -527,15 +513,15 @@ class McapLineReader:
                 topic, name = channel
                 if name in (CONTACT_TYPE, LINE_TYPE):
                     wanted.append((name, topic, self._unpacked(data[begin + 22 : end]), unpack("<Q", data, begin + 6)[0]))
-                elif name == PRESSURES_TYPE and not cloud:
-                    cloud = data[begin + 22 : end]
+                elif name == PRESSURES_TYPE:
+                    clouds.setdefault(topic, data[begin + 22 : end])
             elif kind in (_SCHEMA, _CHANNEL):
                 self._declare(kind, data[begin:end])
         found: list[Line | Contacts | Damaged] = []
         contact = next((each for each in wanted if each[0] == CONTACT_TYPE), None)
         if self._topic is None and contact and all(name != LINE_TYPE for _, name in channels.values()):
             self._topic = contact[1]
-            found += self._made_head(contact[2], cloud)
+            found += self._made_head(contact[2], clouds.get(contact[1].rpartition("/")[0] + "/pressures", b""))
             self._count = len(found)
         self._has_any = self._has_any or bool(wanted)
         if self._begin_ns is None and wanted:

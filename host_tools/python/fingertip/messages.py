@@ -107,8 +107,8 @@ class FrameMessages:
         cloud |= {"is_bigendian": False, "point_step": 16, "row_step": 16 * sensors, "data": points.tobytes(), "is_dense": False}
         self._cloud, self._cloud_head = points, encode(PRESSURES_TYPE, cloud)[12 : -points.nbytes - 1]
 
-    def of(self, time_ns: int, row: dict[str, Any]) -> Iterator[tuple[str, bytes]]:
-        """(type, bytes) of a frame. row: fingertip_msgs/Contact without its header."""
+    def of(self, time_ns: int, row: dict[str, Any], is_repeated: bool = True) -> Iterator[tuple[str, bytes]]:
+        """(type, bytes) of a frame. row: fingertip_msgs/Contact without its header. is_repeated: other types than Contact have its numbers, too."""
         head = (time_ns // 10**9, time_ns % 10**9, *self._text)
         pressures, tares = row["pressure_pa"], row["tare_pa"]
         packer = self._packers.get(len(pressures))
@@ -117,12 +117,12 @@ class FrameMessages:
             packer = self._packers[len(pressures)] = packer_of((*self._codes, *_CONTACT_CODES, *lists))
         body = packer.pack(*head, *_contact_values(row), len(pressures), *pressures, len(tares), *tares)
         yield CONTACT_TYPE, CDR_LITTLE_ENDIAN + body
-        if row["has_contact"]:
-            flags = row["flags"]
+        flags = row["flags"]
+        if is_repeated and row["has_contact"]:
             x_mm, y_mm, *forces_N = _as_binary32(row["x_mm"], row["y_mm"], row["force_n"], row["qx_n"], row["qy_n"])
             yield WRENCH_TYPE, CDR_LITTLE_ENDIAN + self._six.pack(*head, *_wrench(flags, x_mm, y_mm, *forces_N))
             yield PLACE_TYPE, CDR_LITTLE_ENDIAN + self._three.pack(*head, *_location(flags, x_mm, y_mm))
-        if row["has_raw"] and self._cloud is not None and len(self._cloud) == len(pressures):
+        if is_repeated and row["has_raw"] and self._cloud is not None and len(self._cloud) == len(pressures):
             valid = row["valid"]
             self._cloud[:, 3] = [a - b if valid >> k & 1 else math.nan for k, (a, b) in enumerate(zip(pressures, tares))]
             yield PRESSURES_TYPE, CDR_LITTLE_ENDIAN + struct.pack("<iI", *head[:2]) + self._cloud_head + self._cloud.tobytes() + b"\0"

@@ -50,10 +50,10 @@ class TestMcap(unittest.TestCase):
         return lines[0]
 
     def test_three_readers_find_every_message_as_the_csv_file_has_it(self):
-        """What the tool and the package write, also of a file that breaks off."""
-        figures = bags.main(FINGERTIP, FAKE_DEVICE, 0.4, 10, random_frames=300)
+        """What the tool and the package write."""
+        figures = bags.main(FINGERTIP, FAKE_DEVICE, 0.4, random_frames=300)
         self.assertGreater(figures["mcap_messages"], 1000)
-        for name in ("messages_differ", "bags_differ", "round_trips_differ", "truncations_unread"):
+        for name in ("messages_differ", "bags_differ", "round_trips_differ"):
             self.assertEqual(figures[f"mcap_{name}"], 0, name)
 
     def test_no_row_is_lost_in_silence(self):
@@ -104,14 +104,29 @@ class TestMcap(unittest.TestCase):
         with open(path, "rb") as file:
             reader = make_reader(file)
             topics = {channel.topic for channel in reader.get_summary().channels.values()}
-            names = [each.name for each in reader.iter_attachments()]
         self.assertIn("/fingertip/s0001ABCD/contact", topics, "no topic begins with a digit")
         self.assertIn("/fingertip/s0002ABCD/wrench", topics)
-        self.assertEqual(names, ["calibration_0001ABCD.json", "calibration_0002ABCD.json"])
         bag = self.convert(self.several_csv, "two.mcap")
         rows = [line.split(",")[0] for line in self.several_csv.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
         found = [topic for topic, *_ in bags.by_rosbags(bag)]
         self.assertEqual([found.count(f"/fingertip/{name}/contact") for name in ("AAAA", "BBBB")], [rows.count("0"), rows.count("1")])
+
+    def test_the_points_of_a_camera_are_no_sensors(self):
+        bag = self.folder / "camera.mcap"
+        with open(self.bag, "rb") as file, open(bag, "wb") as out:
+            found = [each for each in make_reader(file).iter_messages() if each[1].topic.endswith(("/contact", "/pressures"))]
+            schema, _, cloud = next(each for each in found if each[1].topic.endswith("/pressures"))
+            writer = Writer(out)
+            writer.start("ros2", "other")
+            for schema, topic, data in [
+                (schema, "/camera/pressures", cloud.data[:-241] + bytes(241)),
+                *((s, c.topic, m.data) for s, c, m in found),
+            ]:
+                number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                writer.add_message(writer.register_channel(topic, "cdr", number), cloud.log_time, data, cloud.log_time)
+            writer.finish()
+        right = read_recording(self.bag).metadata["x_mm"]
+        self.assertEqual([read_recording(path).metadata["x_mm"] for path in (bag, self.convert(bag, "camera.csv"))], [right, right])
 
     def test_a_torn_recording_is_converted_with_salvage_only(self):
         torn, uncut = self.folder / "torn.csv", self.folder / "unended.csv"
