@@ -72,7 +72,7 @@ class Run:
         if done.returncode != 0:
             raise AssertionError(f"the emulator found something wrong:\n{done.stderr}")
         self.report = json.loads(self.path("json").read_text())
-        replay = [tools.fingertip, "replay", self.path("ftr"), "--to-csv", self.path("csv"), "--overwrite"]
+        replay = [tools.fingertip, "convert", self.path("ftr"), self.path("csv"), "--overwrite"]
         subprocess.run(replay, check=True, capture_output=True)
         self.recording = files.read_recording(self.path("csv"))
 

@@ -55,7 +55,7 @@ class Run:
         base.with_suffix(".script").write_text("\n".join(lines) + "\n")
         files = {"host_script": base.with_suffix(".script"), "capture": f"{base}.ftr", "usb_log": f"{base}.usb", "report": f"{base}.json"}
         run("node", MAIN, *options(board=BOARD, image=tools.image(BOARD), scenario=path, **files), *more)
-        run(tools.fingertip, "replay", f"{base}.ftr", "--to-csv", f"{base}.csv")
+        run(tools.fingertip, "convert", f"{base}.ftr", f"{base}.csv")
         emulated = json.loads(pathlib.Path(f"{base}.json").read_text())
         recording = read_recording(f"{base}.csv")
         health = recording.health()[-1]

@@ -73,15 +73,14 @@ class Comparison:
         self.strong = self.compared & (self.true_force_N > FORCE_MIN_N)
 
         recorded = (self.t_s[0], self.t_s[-1])
-        self.slips = [s for s in scenario.intervals("slip") if recorded[0] <= s[0] and s[1] <= recorded[1]]
         missed = valid_lost = 0
         delays_ms = []
         window_s = float(recording.metadata.get("slip_window_ms", DEFAULT_SLIP_WINDOW_ms)) / 1000
         outside = self.slip.copy()
         for start, end in scenario.intervals("slip"):
             outside &= ~((self.t_s >= start) & (self.t_s <= end + window_s))
-        for start, end in self.slips:
-            if end - start < SLIP_MIN_s:
+        for start, end in scenario.intervals("slip"):
+            if end - start < SLIP_MIN_s or start < recorded[0] or end > recorded[1]:
                 continue
             found = self.t_s[self.slip & (self.t_s >= start) & (self.t_s <= end + SLIP_LATE_s)]
             if len(found):
@@ -140,9 +139,7 @@ class Comparison:
 def add_recording_options(parser):
     parser.add_argument("--salvage", action="store_true", help="skip damaged lines of the recording and print how many")
     parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")
-    parser.add_argument(
-        "--from", dest="from_s", type=float, default=0.0, metavar="S", help="leave out what is before, since the recording began"
-    )
+    parser.add_argument("--from", dest="from_s", type=float, default=0.0, metavar="S", help="leave out what is before; since its begin")
     parser.add_argument("--to", dest="to_s", type=float, default=math.inf, metavar="S", help="leave out what is after")
 
 

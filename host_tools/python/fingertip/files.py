@@ -251,7 +251,7 @@ class Recording:
         first = len(names) - 2 * sensors
         self.columns = {name: table[:, i] for i, name in enumerate(names[:first])}
         missing = set(LATER_COLUMNS).difference(self.columns)
-        self.columns |= {name: np.full(len(table), math.nan) for name in missing}
+        self.columns |= {name: np.broadcast_to(math.nan, len(table)) for name in missing}  # without memory
         self.sensors_Pa = table[:, first : first + sensors]
         self.tare_Pa = table[:, first + sensors : first + 2 * sensors]
 

@@ -32,6 +32,7 @@ TIME_COLOURS = "winter"  # from blue to green: far from DOUBTFUL and SLIPPING
 ABOVE = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.2, "fontsize": 8, "frameon": False}
 RIM_mm = 6.0
 POINTS = 4000  # that are drawn of a curve, some four for each pixel
+STATES = (FIT_VALID, WARNINGS, SLIP, TANGENTIAL_VALID, MOVING, SLIDING)  # that curves break at, or marks show
 WORTH_SHOWING_s, LINES_s = 2.0, 10.0
 # All that a picture needs: 250 000 rows of these are 30 MB, of all columns 130.
 COLUMNS = ("t_us", "frame", "flags", "x_mm", "y_mm", "force_N", "qx_N", "qy_N", "q_sd_N", "tangential_ratio")
@@ -57,14 +58,17 @@ def gaps_as_nan(t_s, values, fitted):
 
 
 def thinned(recording, rows):
-    """Of many rows those with the least and the largest force of each bin, and where slip begins and ends: a picture has no room for more."""
+    """Of many rows those with the least and the largest force of each bin, and where a state begins and ends: a picture has no room for more."""
     step = len(rows) // POINTS
     if step < 2:
         return rows
     bins = len(rows) // step
     force = np.nan_to_num(recording["force_N"][rows[: bins * step]]).reshape(bins, step)
-    first, slip = np.arange(bins) * step, np.flatnonzero(np.diff(recording.flag(SLIP)[rows]))
-    return rows[np.unique(np.concatenate((first + force.argmin(axis=1), first + force.argmax(axis=1), slip, slip + 1, [len(rows) - 1])))]
+    first, states = np.arange(bins) * step, [recording.flag(flag)[rows] for flag in STATES]
+    change = np.flatnonzero(np.diff(states).any(axis=0))
+    return rows[
+        np.unique(np.concatenate((first + force.argmin(axis=1), first + force.argmax(axis=1), change, change + 1, [len(rows) - 1])))
+    ]
 
 
 def progress():
@@ -369,9 +373,11 @@ def main(argv):
     check_output(options.output, options.recording, options.truth, options.run, options.beside_run)
     if not options.device and not options.truth and len(recorded_devices(options.recording)) == 2:
         grip = read_grip(options.recording, options.salvage)
-        inside = (grip["time_us"] >= options.from_s * 1e6) & (grip["time_us"] <= options.to_s * 1e6) if grip else ()
-        grip = {name: values[inside] for name, values in grip.items()}
         if grip:
+            inside = (grip["time_us"] >= options.from_s * 1e6) & (grip["time_us"] <= options.to_s * 1e6)
+            if not inside.any():
+                raise InputError(f"{options.recording}: nothing of the grasp from --from to --to; give a part that has some")
+            grip = {name: values[inside] for name, values in grip.items()}
             fingertips = [of_device(options, serial, GRASP_COLUMNS) for serial in recorded_devices(options.recording)]
             print(f"{options.output}: {draw_grasp(options.output, grip, fingertips)}")
             return 0

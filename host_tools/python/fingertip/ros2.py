@@ -12,7 +12,6 @@ import argparse
 import functools
 import math
 import os
-import sys
 import threading
 from collections.abc import Callable
 from types import TracebackType
@@ -80,7 +79,6 @@ class _Device:
         self.messages = FrameMessages(fingertip.serial)
         self.messages.place_sensors(info.x_mm, info.y_mm, info.sensors)
         self.topics = {kind: topic(f"/fingertip/{name}/{of}", kind) for of, kind in FRAME_TOPICS.items()}
-        self.frames = 0
         self.health: Health | None = None
         self.is_gone = False
 
@@ -127,7 +125,6 @@ class Publisher:
         """Sends it on the topics of its fingertip."""
         device = self._devices[frame.serial]
         time_ns = utc_ns(frame)
-        device.frames += 1
         for kind, data in device.messages.of(time_ns, contact_of_frame(frame)):
             if kind == DIAGNOSTICS_TYPE:
                 self._diagnose(data, time_ns)
@@ -156,11 +153,6 @@ class Publisher:
     def _diagnose(self, data: bytes, time_ns: int) -> None:
         with self._lock:
             self._diagnostics.send(data, time_ns)
-
-    @property
-    def frames(self) -> dict[str, int]:
-        """Of each fingertip, by serial number."""
-        return {serial: device.frames for serial, device in self._devices.items()}
 
     @property
     def sent(self) -> dict[str, int]:
@@ -223,13 +215,11 @@ def main(argv: list[str]) -> int:
         with Publisher(options.domain) as publisher:
             fingertips = Fingertips(options.port, serials=options.device, reconnect=True)
             end_s = host_time.now_s() + options.seconds
-            print(
-                f"domain {publisher.domain}: " + " ".join(f"/fingertip/{name_in_ros(serial)}" for serial in fingertips.by_serial),
-                flush=True,
-            )
+            names = [f"/fingertip/{name_in_ros(serial)}" for serial in fingertips.by_serial]
+            print(f"domain {publisher.domain}: {' '.join(names)}", flush=True)
             publish(publisher, fingertips, lambda: stop.is_set() or host_time.now_s() >= end_s)
             for serial, tip in fingertips.by_serial.items():
-                print(f"{serial}: {publisher.frames[serial]} frames, lost {tip.statistics.dropped_packets + tip.overrun_frames}")
+                print(f"{serial}: lost {tip.statistics.dropped_packets + tip.overrun_frames}")
             print("".join(f"{name}: {count} messages\n" for name, count in publisher.sent.items()) + f"refused: {publisher.refused}")
     except FingertipError as error:
         raise InputError(str(error)) from None
@@ -238,7 +228,3 @@ def main(argv: list[str]) -> int:
 
 command = functools.partial(run_tool, "fingertip-ros2", main)
 """The console command."""
-
-
-if __name__ == "__main__":
-    sys.exit(command())

@@ -4,7 +4,6 @@
 
 ideal   ideal Gaussian presses (sigma 5.7 mm) of 0.5 to 20 N at random places of the array; no slip
 demo    taps of different force and place, two slips, a figure-eight stroke; 10 s
-slip20  presses that slip at 20 to 200 mm/s, for the slip measure at 20 frames a second
 wander  one contact of 5 N from 0.6 s to the end that never rests: every frame has something to fit
 
 The pressure is the Gaussian of De Clercq et al., RA-L 2022, eq. (2), and the force its integral, eq. (4): F = 2 pi p0 sigma^2. slip is 1
@@ -117,19 +116,6 @@ def demo(seconds, random):
     return motion
 
 
-def slip20(seconds, random):
-    del random
-    motion = Motion(seconds)
-    start = QUIET_s
-    for speed in (20, 50, 100, 150, 200):
-        length = 28.0
-        end = start + 0.3 + 0.4 + length / speed + 0.01 + 0.4 + 0.3
-        motion.press(start, end, 6.0, 0, -14, 0.3)
-        motion.slide(start + 0.7, end, (0, 1), speed, length)
-        start = end + 0.3
-    return motion
-
-
 def wander(seconds, random):
     del random
     motion = Motion(seconds)
@@ -145,7 +131,6 @@ def wander(seconds, random):
 SCENARIOS = {
     "ideal": (ideal, 20.0, "ideal Gaussian presses at random places, forces log-uniform from 0.5 to 20 N"),
     "demo": (demo, 10.0, "three taps, slips at 40 and 80 mm/s, a figure-eight stroke"),
-    "slip20": (slip20, 12.0, "presses that slip along y at 20, 50, 100, 150 and 200 mm/s"),
     "wander": (wander, 10.0, "one contact of 5 N that moves around the centre at 5 mm/s"),
 }
 

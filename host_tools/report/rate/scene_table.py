@@ -9,7 +9,6 @@ The images are those of the tests: ctest --test-dir build/host -R 'checks.scene_
 
 import argparse
 import pathlib
-import re
 import sys
 import tempfile
 

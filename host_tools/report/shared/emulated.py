@@ -116,7 +116,7 @@ class Measurement:
         counted = emulated["counted"]
         self.cycles = counted["cycles"]
         self.sleep_percent = 100 * (1 - self.cycles / (counted["emulated_s"] * CLOCK_Hz))
-        run(tools.fingertip, "replay", f"{name}.ftr", "--to-csv", f"{name}.csv")
+        run(tools.fingertip, "convert", f"{name}.ftr", f"{name}.csv")
         recording = read_recording(f"{name}.csv")
         if recording.metadata["scene"] != tools.scene:
             raise InputError(f"{tools.image(board)}: is of scene {recording.metadata['scene']}, not {tools.scene}; {TO_BUILD}")

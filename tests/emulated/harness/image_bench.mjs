@@ -85,7 +85,7 @@ export class ImageBench {
     try {
       const [stream, table] = [join(folder, 'stream.ftr'), join(folder, 'stream.csv')];
       writeFileSync(stream, Buffer.concat(this.received));
-      execFileSync(this.tools.fingertip, ['replay', stream, '--to-csv', table], { stdio: 'pipe' });
+      execFileSync(this.tools.fingertip, ['convert', stream, table], { stdio: 'pipe' });
       return readFileSync(table, 'utf8').trim().split('\n');
     } finally {
       rmSync(folder, { recursive: true });

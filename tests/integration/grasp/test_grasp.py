@@ -439,7 +439,7 @@ class Recorded(GraspTest):
         self.assertRegex(out, r" s  still  width 3\d\.\d mm")
         self.assertRegex(out, r"AAAA: \d+ frames in")
         converted = os.path.join(self.folder, "one.csv")
-        self.run_cli("replay", self.csv, "--device", "BBBB", "--to-csv", converted)
+        self.run_cli("convert", self.csv, "--device", "BBBB", converted)
         self.assertTrue(np.array_equal(files.read_recording(converted)["t_us"], right["t_us"]))
         # the line of the manual
         plain = subprocess.run(["sed", "-n", "s/^# grip: //p", self.csv], capture_output=True, text=True, check=True).stdout.splitlines()
@@ -448,16 +448,17 @@ class Recorded(GraspTest):
 
         picture = os.path.join(self.folder, "grasp.png")
 
-        def plot(*options):
+        def plot(*options, status=0):
             words = [sys.executable, PYTHON_TOOLS, "plot", self.csv, *options, "-o", picture]
             done = subprocess.run(words, capture_output=True, text=True, env=self.environment, timeout=PLOT_PATIENCE_s)
-            self.assertEqual(done.returncode, 0, done.stderr)
-            return done.stdout
+            self.assertEqual(done.returncode, status, done.stderr)
+            return done.stdout + done.stderr
 
         self.assertRegex(plot(), r"grasp\.png: 1 slide, held by at most \d+\.\d N, at last still")
         with open(picture, "rb") as file:
             self.assertEqual(file.read(8), b"\x89PNG\r\n\x1a\n")
         self.assertIn("frames in", plot("--device", "AAAA"))
+        self.assertIn("nothing of the grasp from --from to --to", plot("--from", "10000", status=1))
 
         # what is damaged is named, and salvaged
         text = pathlib.Path(self.csv).read_text(encoding="utf-8")

@@ -194,7 +194,7 @@ class Several(CliTest):
         self.assertGreater(span_us, 1e6)
         self.assertGreater(len(errors[0]), 100e-6 * span_us)
         self.assert_in_order()
-        several = self.run_cli("replay", self.csv, "--to-csv", self.csv + "2", status=1)[1]
+        several = self.run_cli("convert", self.csv, self.csv + ".ftr", status=1)[1]
         self.assertIn("holds several fingertips: AAAA BBBB; choose one with --device SERIAL", several)
 
     def test_all_agree_on_what_came(self):
@@ -217,7 +217,7 @@ class Several(CliTest):
                 out, _ = self.run_cli("replay", path, "--device", serial, "--speed", "max")
                 self.assertRegex(out, r" 0 packets dropped, 0 CRC errors")
                 converted = os.path.join(self.folder, "c.csv")
-                out, _ = self.run_cli("replay", path, "--device", serial, "--to-csv", converted, "--overwrite")
+                out, _ = self.run_cli("convert", path, "--device", serial, converted, "--overwrite")
                 self.assertRegex(out, f": {end[1]} frames, packets=\\d+ dropped_packets=0 out_of_order=0 ")
                 again = files.read_recording(converted)
                 self.assertEqual(again.end["dropped_packets"], "0")

@@ -31,7 +31,7 @@ class Recording(CliTest):
         self.assertTrue(all(row["x_mm"] and row["s14_Pa"] and row["tare0_Pa"] for row in rows[:-1]))
         # the captured bytes hold the same frames
         converted = os.path.join(self.folder, "c.csv")
-        self.run_cli("replay", self.ftr, "--to-csv", converted)
+        self.run_cli("convert", self.ftr, converted)
         again, _ = self.rows(converted)
         self.assertEqual(again[: len(rows) - 1], rows[:-1])
 
@@ -218,30 +218,31 @@ class Replay(CliTest):
         pathlib.Path(self.csv).write_text("".join(lines[:-1]), encoding="utf-8")  # without the end line
         err = self.run_cli("replay", self.csv, "--speed", "max", status=1)[1]
         self.assertRegex(err, f"{self.csv}:{torn + 1}: .*use --salvage")
-        for option in (("--speed", "max"), ("--to-csv", self.folder + "/c.csv")):
-            out, err = self.run_cli("replay", self.csv, *option, "--salvage")
-            self.assertIn("1 damaged lines skipped", err)
-            self.assertIn(f"{self.csv}: no end line: the recording was cut short", err)
-            self.assertIn("99 frames", out)
+        out, err = self.run_cli("replay", self.csv, "--speed", "max", "--salvage")
+        self.assertIn("1 damaged lines skipped", err)
+        self.assertIn(f"{self.csv}: no end line: the recording was cut short", err)
+        self.assertIn("99 frames", out)
 
     def test_a_conversion_never_harms_a_file(self):
         self.record()
         before = pathlib.Path(self.csv).read_bytes()
-        self.assertIn("is the file to read; give another name", self.error("replay", self.csv, "--to-csv", self.csv, "--overwrite"))
-        self.assertIn("exists already", self.error("replay", self.ftr, "--to-csv", self.csv))
+        self.assertIn("is the file to read; give another name", self.error("convert", self.csv, self.csv, "--overwrite"))
+        self.assertIn("exists already", self.error("convert", self.ftr, self.csv))
+        part = ("convert", self.csv, self.folder + "/c.csv", "--from", "1000", "--to", "1001")
+        self.assertIn("r.csv: no frames from --from to --to", self.error(*part))
 
         # a disk that is full in the middle
-        _, err = self.run_cli("replay", self.ftr, "--to-csv", self.csv, "--overwrite", status=1, preexec_fn=limit)
+        _, err = self.run_cli("convert", self.ftr, self.csv, "--overwrite", status=1, preexec_fn=limit)
         self.assertIn("nothing was changed", err)
         self.assertEqual(pathlib.Path(self.csv).read_bytes(), before)
         self.assertEqual(sorted(os.listdir(self.folder)), ["r.csv", "r.ftr"])
-        self.run_cli("replay", self.ftr, "--to-csv", self.csv, "--overwrite")
+        self.run_cli("convert", self.ftr, self.csv, "--overwrite")
         self.assertIn("reason=converted", self.rows()[1][-1])
 
     def test_a_conversion_keeps_what_the_recorder_knew(self):
         self.record()
         converted = os.path.join(self.folder, "c.csv")
-        self.run_cli("replay", self.csv, "--to-csv", converted)
+        self.run_cli("convert", self.csv, converted, "--device", "E660583883265A2C")
         before, after = (files.read_recording(path) for path in (self.csv, converted))
         for key in ("started_utc", "started_device_us", "started_uncertainty_us", "port", "serial"):
             self.assertEqual(after.metadata[key], before.metadata[key])
@@ -249,7 +250,7 @@ class Replay(CliTest):
         self.assertEqual(after.end | {"reason": ""}, before.end | {"reason": ""})
         # once more, and still each key once
         twice = os.path.join(self.folder, "d.csv")
-        self.run_cli("replay", converted, "--to-csv", twice)
+        self.run_cli("convert", converted, twice, "--device", "E660583883265A2C")
         text = pathlib.Path(twice).read_text(encoding="utf-8")
         for key in ("recorded_by", "source", "port", "started_utc"):
             self.assertEqual(text.count(f"\n# {key}: "), 1, key)
@@ -259,9 +260,9 @@ class Replay(CliTest):
         pathlib.Path(noise).write_bytes(bytes(range(256)) * 20)
         pathlib.Path(text).write_text("x\n")
         self.assertIn("no frames in it", self.run_cli("replay", noise, "--speed", "max", status=1)[1])
-        self.assertIn("no frames in it", self.error("replay", noise, "--to-csv", self.csv))
-        for option in ([], ["--to-csv", self.csv]):
-            self.assertIn("neither a recording nor bytes of a fingertip's line", self.error("replay", text, *option))
+        self.assertIn("no frames in it", self.error("convert", noise, self.csv))
+        for words in (["replay", text], ["convert", text, self.csv]):
+            self.assertIn("neither a recording nor bytes of a fingertip's line", self.error(*words))
         self.assertFalse(os.path.exists(self.csv))
         self.assertIn("No such file", self.run_cli("replay", self.folder + "/absent.csv", status=1)[1])
 

@@ -77,7 +77,7 @@ class Sharing(ServeTest):
             for process in (first, second, monitor):
                 self.finished(process)
         direct = self.path("direct.csv")
-        self.run_cli("replay", line, "--to-csv", direct)
+        self.run_cli("convert", line, direct)
         expected = self.rows_but_numbers(direct)
         self.assertEqual(sorted({int(row["frame"]) for row in expected}), list(range(1, 701)))
         for path in (first_csv, second_csv):
@@ -94,7 +94,7 @@ class Sharing(ServeTest):
         self.assertEqual(int(self.rows(first_csv)[0][0]["frame"]), 1)
         # what the client's own line held is the same again
         again = self.path("again.csv")
-        self.run_cli("replay", self.ftr, "--to-csv", again)
+        self.run_cli("convert", self.ftr, again)
         self.assertEqual(self.rows(again)[0], self.rows(first_csv)[0])
 
     def test_two_fingertips_on_one_clock_while_others_look(self):

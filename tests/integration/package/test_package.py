@@ -26,7 +26,7 @@ fingertip --version > version
 fingertip rule > rule
 cmp rule /usr/lib/udev/rules.d/60-fingertip.rules
 ldconfig -p > libraries
-fingertip replay press.csv --to-csv again.csv
+fingertip convert press.csv again.csv
 """
 
 
@@ -81,7 +81,7 @@ class Package(unittest.TestCase):
         self.assertEqual((packages / "version").read_text(), run(TOOLS.fingertip, "--version"))
         self.assertEqual((packages / "rule").read_text(), run(TOOLS.fingertip, "rule"))
         self.assertIn("libfingertip.so", (packages / "libraries").read_text())
-        run(TOOLS.fingertip, "replay", recording, "--to-csv", self.folder / "again.csv")
+        run(TOOLS.fingertip, "convert", recording, self.folder / "again.csv")
         there, here = (
             [line for line in path.read_text().splitlines() if "press.csv" not in line]  # where it came from
             for path in (packages / "again.csv", self.folder / "again.csv")

@@ -100,7 +100,7 @@ class Codec(DeviceTest):
     def test_what_it_writes_is_what_c_writes_of_the_same_line(self):
         packets = [packet._replace(sequence=number & 0xFFFF) for number, packet in enumerate(bags.some_packets(1, 400), 65500)]
         pathlib.Path(self.path("line.ftr")).write_bytes(b"\0" + b"".join(map(wire.encode, packets)))
-        self.call("replay", self.path("line.ftr"), "--to-csv", self.path("c.csv"))
+        self.call("convert", self.path("line.ftr"), self.path("c.csv"))
         with fingertip.RecordingWriter(self.path("python.csv"), packets[0].body) as writer:
             for packet in packets:
                 writer.packet(packet)
@@ -457,8 +457,8 @@ class Together(DeviceTest):
         for serial in ("AAAA", "BBBB"):
             recording = fingertip.read_recording(self.path("j.csv"), serial=serial)
             self.assertEqual((recording.end["dropped_packets"], recording.end["reason"]), ("0", "closed"))
-            self.call("replay", self.path("j.csv"), "--device", serial, "--to-csv", self.path(serial))
-            alone = fingertip.read_recording(self.path(serial))
+            self.call("convert", self.path("j.csv"), "--device", serial, self.path(f"{serial}.csv"))
+            alone = fingertip.read_recording(self.path(f"{serial}.csv"))
             np.testing.assert_array_equal(alone["x_mm"], recording["x_mm"])
             self.assertEqual(alone.packets, recording.packets)
             taken = {frame.frame: frame for frame in frames if frame.serial == serial}

@@ -54,9 +54,9 @@ REPORTS = {
             },
             "over_time": {"plain_cover_1sd_percent": 92.0, "thin_cover_1sd_percent": 80.0, "over_time": [{"pad": "plain", "pads": 3}]},
         },
-        "kept": {"fit.json": {"cold_cycles": 30000, "masked_cycles": 63000}},
-        "met": ("cover_1sd_min", "cal_median_mm", "cold_cycles", "thin_cover_1sd_percent"),
-        "missed": ("cover_1sd_max", "masked_cycles", "plain_cover_1sd_percent"),
+        "kept": {"reliability.json": {"flash_lost": 0, "flash_frames_skipped": 2}},
+        "met": ("cover_1sd_min", "cal_median_mm", "flash_lost", "thin_cover_1sd_percent"),
+        "missed": ("cover_1sd_max", "flash_frames_skipped", "plain_cover_1sd_percent"),
         "open": "real_median_mm_worst_test",
         "lines": (
             "| plain_cover_1sd_percent | 92 | 55 to 80 | MISSED |",

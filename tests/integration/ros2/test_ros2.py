@@ -114,7 +114,7 @@ class Command(unittest.TestCase):
 
     def ros2(self, *options, **more):
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        words = [sys.executable, "-m", "fingertip.ros2", *map(str, options)]
+        words = [sys.executable, str(PACKAGE), "ros2", *map(str, options)]
         command = subprocess.Popen(words, env={**self.environment, **more}, cwd=self.folder, **pipes)
         self.addCleanup(command.communicate)
         self.addCleanup(command.kill)
@@ -157,7 +157,7 @@ class Command(unittest.TestCase):
 
     def test_without_cyclonedds(self):
         (self.folder / "cyclonedds.py").write_text("raise ImportError\n")
-        command = self.ros2()
+        command = self.ros2(PYTHONPATH=str(self.folder))
         self.assertEqual(
             command.communicate(timeout=PATIENCE_s)[1], "fingertip-ros2: ROS 2 topics need the package cyclonedds; pip install cyclonedds\n"
         )

@@ -178,7 +178,7 @@ void convert_lines(const Conversion &conversion) {
   auto sink = make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished);
   LineSource::Line line;
   Progress progress(conversion.from);
-  std::uint64_t last = 0, count = 0;
+  std::uint64_t last = 0, count = 0, rows = 0; /* and the header */
   bool is_ended = false;
   const auto report_damage = [&](const std::string &what, const std::string &place = "") {
     if (!conversion.salvage) {
@@ -203,6 +203,7 @@ void convert_lines(const Conversion &conversion) {
     }
     last = line.number;
     count++;
+    rows += !line.text.empty() && line.text[0] != '#';
     progress.show([&] { return source->place(); });
     is_ended = is_ended || (!line.torn && line.text.rfind("# end:", 0) == 0);
     if (line.torn) {
@@ -214,6 +215,9 @@ void convert_lines(const Conversion &conversion) {
   }
   if (const std::string unread = sink->unread_rows(); !unread.empty()) {
     report_damage(unread); /* they are kept as text */
+  }
+  if (!conversion.interval.is_all() && rows < 2) {
+    throw Error(conversion.from + ": no frames from --from to --to; give a part that has some");
   }
   sink->finish();
   report_cut_short(conversion.from, !is_ended);
@@ -260,8 +264,6 @@ struct ReplayOptions {
   double speed = 1; /* 0: as fast as possible */
   bool salvage = false;
   std::string device; /* of several in the file */
-  std::string to_csv; /* empty: show it */
-  bool overwrite = false;
   ColourMode colour = ColourMode::automatic;
   TimeSpan interval;
 };
@@ -325,13 +327,7 @@ int show(const ReplayOptions &options) {
 
 void add_replay(CommandLine &line) {
   auto options = std::make_shared<ReplayOptions>();
-  CLI::App *command = line.add("replay", "Show a recording or a capture of bytes", [options] {
-    if (options->to_csv.empty()) {
-      return show(*options);
-    }
-    convert_packets({options->file, options->to_csv, options->device, options->salvage, options->overwrite, options->interval});
-    return 0;
-  });
+  CLI::App *command = line.add("replay", "Show a recording or a capture of bytes", [options] { return show(*options); });
   with_value(command, "FILE", "file", options->file, "Recording (.csv, .mcap) or bytes of the line (.ftr)")->required();
   command
       ->add_option_function<std::string>(
@@ -341,8 +337,6 @@ void add_replay(CommandLine &line) {
   with_value(command, "SERIAL", "--device", options->device,
              "Serial number of one of several fingertips in the recording; default: show all");
   command->add_flag("--salvage", options->salvage, "Skip damaged lines and count them");
-  with_value(command, "OUT.csv", "--to-csv", options->to_csv, "Write a recording instead of showing it");
-  command->add_flag("--overwrite", options->overwrite, "Replace OUT.csv if it exists");
   with_time_span(command, options->interval);
   with_colour(command, options->colour);
 }
