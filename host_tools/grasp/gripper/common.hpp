@@ -66,7 +66,7 @@ private:
   HostTime sure_until_{}; // and is still waited for
 };
 
-// "; the USB adapter's latency timer ..." where that limits the rate of a command, which takes so many exchanges; "" where it does not.
+// "; the USB adapter's latency timer ..." where that limits the rate of a command of this number of exchanges; "" where it does not.
 std::string limited_by(const std::string &port, int exchanges);
 
 } // namespace fingertip

@@ -10,7 +10,7 @@ the sensor's range, and saturation to int32.
 A warning is UNCERTAIN, MODEL, FLAT, AT_BOUND, LOW_SIGNAL, FORCE_LOWER_BOUND, no contact or no fit. The firmware has the true settings: gains are exact where
 the case does not spread them. Bad means more than 1 mm from the truth, and any location where there is none to find; of two contacts the truth is the
 centroid of force. stability.png has the error of other kernels beside that of this chain, along one quantity at a time: in presses of sigma 6 mm, or as
-its axis says. --check: exit status 1 if a result is not finite, or if more than 1.3 % of a case are bad and carry no warning (6 % where a prior is wrong).
+its axis is labelled. --check: exit status 1 if a result is not finite, or if more than 1.3 % of a case are bad and carry no warning (6 % where a prior is wrong).
 """
 
 import pathlib
