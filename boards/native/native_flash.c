@@ -125,8 +125,6 @@ void native_flash_power_up(void) {
 
 void native_flash_wear_out(void) { state.worn_out = true; }
 
-uint64_t native_flash_steps(void) { return state.steps; }
-
 static void begin(enum operation operation, uint32_t at, const uint8_t *bytes, size_t length, unsigned polls) {
   if (state.operation != NONE && !state.dead) {
     stop("an operation begins while another one is under way");

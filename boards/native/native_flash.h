@@ -30,6 +30,3 @@ void native_flash_power_up(void);
 
 /* From now on bits cannot be programmed any more: a flash that has worn out. */
 void native_flash_wear_out(void);
-
-/* Steps since reset. */
-uint64_t native_flash_steps(void);

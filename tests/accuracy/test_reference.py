@@ -15,10 +15,11 @@ import unittest
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/fit", "report/measure", "python")]
+sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/pads", "report/fit", "report/shared", "report/measure", "python")]
 import errors  # noqa: E402
+import pads  # noqa: E402
 import presses  # noqa: E402
-from measure import Measure, q10  # noqa: E402
+from measure import Measure  # noqa: E402
 
 BUILD = sys.argv.pop()
 MEASURE = Measure(BUILD)
@@ -64,22 +65,9 @@ def cost_at(these, best, dx_mm=0.0, dy_mm=0.0):
 
 class Rectangles(unittest.TestCase):
     def test_every_rectangle_reaches_the_optimum_with_seven_iterations(self):
-        other, random = presses.Compared(MEASURE), np.random.default_rng(SEED)
-        for columns, rows in ((2, 4), (3, 3), (3, 5), (4, 4), (4, 5), (5, 6), (6, 5)):
-            column, row = np.divmod(np.arange(columns * rows), rows)
-            other.x_mm, other.y_mm = 9.0 * (column - (columns - 1) / 2), 9.0 * (row - (rows - 1) / 2)
-            x_mm, y_mm = (random.uniform(places.min(), places.max(), (1000, 1)) for places in (other.x_mm, other.y_mm))
-            sigma_mm, p0_Pa = random.uniform(3.5, 8.0, (1000, 1)), 10.0 ** random.uniform(3.7, 4.7, (1000, 1))
-            square = (x_mm - other.x_mm) ** 2 + (y_mm - other.y_mm) ** 2
-            readings = q10(p0_Pa * np.exp(-square / (2 * sigma_mm**2)) + 5.0 * random.normal(size=square.shape))
-            best = other.optimum(readings, np.full(1000, (1 << columns * rows) - 1, np.uint32), np.full(1000, 5.0))
-            found = MEASURE.fit(
-                MEASURE.array(other.x_mm, other.y_mm, 9.0), MEASURE.settings(noise_Pa=5.0, iterations=7, cut_noises=0), readings
-            )
-            judged = best["observable"] & ~best["at_bound"]
-            self.assertGreater(judged.mean(), 0.9)
-            off_um = 1000 * np.hypot(found["x_mm"] - best["x_mm"], found["y_mm"] - best["y_mm"])[judged]
-            self.assertLess(np.quantile(off_um, 0.999), 1.0, (columns, rows))
+        for columns, rows in pads.RECTANGLES:
+            um = pads.p99_9_um(MEASURE, columns, rows, 1000, np.random.default_rng(SEED))
+            self.assertLess(um, 1.0, (columns, rows))
 
 
 class Optimum(unittest.TestCase):
@@ -233,21 +221,22 @@ class Program(unittest.TestCase):
     def test_what_is_wrong_is_one_line(self):
         good = [pressure_Pa(k) for k in range(15)]
         for options, text, words in (
-            (("fit", "none.csv"), "", "none.csv: cannot read it"),
-            (("fit",), "", "no header"),
+            (("fit", "none.csv"), "", "none.csv: No such file"),
+            (("fit",), "", "has no column s0_Pa"),
             (("fit",), table(good[:14]), "has no column s14_Pa"),
             (("fit",), table(good, device=0), "several fingertips"),
             (("fit",), table([AIR_Pa] * 15), "absolute pressures"),
-            (("fit",), table(good).replace("\n7", "\n7,7"), "standard input:2: has 17 cells"),
+            (("fit",), table(good).replace("\n7", "\n7,7"), "stdin:2: has 17 cells"),
+            (("fit", "--noise", "0"), table(good), "--noise 0 is out of range"),
             (("fit",), table(good, noise_Pa="loud"), "'loud' is not a number"),
-            (("fit",), table(good, before="# gains: 1 1\n"), "2 gains for 15"),
-            (("fit",), table(good, before=f"# gains:{' 0' * 15}\n"), "'0' is no gain"),
+            (("fit",), table(good, before="# gains: 1 1\n"), "15 sensors are not 2"),
+            (("fit",), table(good, before=f"# gains:{' 0' * 15}\n"), "are not 15 above 0"),
         ):
             done = run(*options, text=text)
             self.assertEqual(done.returncode, 1, words)
             self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
             self.assertIn(words, done.stderr)
-        for options in (("fit", "--noise", "0"), ("presses",), ()):
+        for options in (("presses",), ()):
             done = run(*options)
             self.assertEqual(done.returncode, 2, options)
             self.assertIn("error: ", done.stderr)

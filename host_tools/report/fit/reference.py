@@ -9,7 +9,6 @@ a calibrated fingertip, as the fit gets them.
 """
 
 import argparse
-import csv
 import pathlib
 import sys
 from types import SimpleNamespace
@@ -19,7 +18,7 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/measure", "python")]
 import presses  # noqa: E402
-from fingertip.files import InputError, run_tool  # noqa: E402
+from fingertip.files import InputError, check_range, read_lines, run_tool  # noqa: E402
 from measure import Measure, usable_of  # noqa: E402
 
 ABSOLUTE_Pa = 50e3  # no pad weighs on all of its sensors by this
@@ -28,82 +27,51 @@ FOUND = (("best_x_mm", "x_mm"), ("best_y_mm", "y_mm"), ("best_p0_Pa", "p0_Pa"), 
 ROWS_AT_ONCE = 2000
 
 
-class Table:
-    """Rows of readings: names of the columns, and for each row its first cell, readings_Pa [sensor] and what else fit needs."""
+def number(where, cell):
+    try:
+        return float(cell or "nan")
+    except ValueError:
+        raise InputError(f"{where}: '{cell}' is not a number") from None
 
-    def __init__(self, lines, path):
-        self.path, self.gains, self.lines = path, np.ones(presses.SENSORS), self.numbered(lines)
-        self.names = next(self.lines, (0, None))[1]
-        if self.names is None:
-            raise InputError(f"{path}: no header; the first line names the columns")
-        if "device" in self.names:
-            raise InputError(f"{path}: holds several fingertips; record each alone")
-        for k in range(presses.SENSORS):
-            if f"s{k}_Pa" not in self.names:
-                what = f"give readings of all {presses.SENSORS} sensors, a recording with the raw stream, or a scenario"
-                raise InputError(f"{path}: has no column s{k}_Pa; {what}")
-        self.with_zero = "tare0_Pa" in self.names
 
-    def numbered(self, lines):
-        """(number, cells) of each row, without comments, of which the gains count."""
-        for number, line in enumerate(lines, 1):
-            line = line.rstrip("\r\n")
-            if line.startswith("# gains: "):
-                self.gains = self.gains_of(number, line.removeprefix("# gains: ").split(" "))
-            if line and not line.startswith("#"):
-                yield number, next(csv.reader([line]))
-
-    def gains_of(self, number, words):
-        if len(words) != presses.SENSORS:
-            raise InputError(f"{self.path}:{number}: {len(words)} gains for {presses.SENSORS} sensors")
-        gains = [self.number(number, word) for word in words]
-        for word, gain in zip(words, gains):
-            if not gain > 0:
-                raise InputError(f"{self.path}:{number}: '{word}' is no gain")
-        return np.array(gains)
-
-    def number(self, number, cell):
-        try:
-            return float(cell) if cell else np.nan
-        except ValueError:
-            raise InputError(f"{self.path}:{number}: '{cell}' is not a number") from None
-
-    def rows(self, noise_Pa):
-        for number, cells in self.lines:
-            if len(cells) != len(self.names):
-                raise InputError(f"{self.path}:{number}: has {len(cells)} cells, its header {len(self.names)}")
-            row = dict(zip(self.names, cells))
-            value = {name: self.number(number, row.get(name, "")) for name in ("noise_Pa", "x_mm", "y_mm")}
-            reading, tare = (
-                np.array([self.number(number, row.get(f"{name}{k}_Pa", "")) for k in range(presses.SENSORS)]) for name in ("s", "tare")
-            )
-            readings_Pa = (reading - (tare if self.with_zero else 0.0)) / self.gains
-            there = readings_Pa[~np.isnan(readings_Pa)]
-            if no_zero := len(there) > 0 and there.min() > ABSOLUTE_Pa:
-                if not self.with_zero:
-                    raise InputError("the readings are absolute pressures; subtract each sensor's zero, or give its column tare0_Pa, ...")
-            fits = len(there) >= SENSORS_MIN and there.max() > 0 and not no_zero
-            noise = noise_Pa if np.isnan(value["noise_Pa"]) else value["noise_Pa"]
-            yield SimpleNamespace(
-                first=cells[0], readings_Pa=readings_Pa, fits=fits, noise_Pa=noise, x_mm=value["x_mm"], y_mm=value["y_mm"]
-            )
+def read(lines, path, noise_Pa):
+    """(name of the first column, rows): of each its first cell, readings_Pa [sensor] and what else the fit needs."""
+    lines = [line.rstrip("\r\n") for line in lines]
+    marked = next((line for line in lines if line.startswith("# gains: ")), "# gains:" + presses.SENSORS * " 1")
+    gains = np.array([number(path, word) for word in marked.removeprefix("# gains: ").split(" ")])
+    if len(gains) != presses.SENSORS or not (gains > 0).all():
+        raise InputError(f"{path}: the gains of {presses.SENSORS} sensors are not {len(gains)} above 0")
+    (_, names), *table = [(at, line.split(",")) for at, line in enumerate(lines, 1) if line and line[0] != "#"] or [(0, [""])]
+    if missing := [name for name in (f"s{k}_Pa" for k in range(presses.SENSORS)) if name not in names]:
+        raise InputError(f"{path}: has no column {missing[0]}; give a recording with the raw stream, or a scenario")
+    if "device" in names:
+        raise InputError(f"{path}: holds several fingertips; record each alone")
+    rows = []
+    for at, cells in table:
+        if len(cells) != len(names):
+            raise InputError(f"{path}:{at}: has {len(cells)} cells, its header {len(names)}")
+        row = dict(zip(names, cells))
+        noise, x_mm, y_mm, *pressures = (
+            number(f"{path}:{at}", row.get(name, ""))
+            for name in ("noise_Pa", "x_mm", "y_mm", *(f"{kind}{k}_Pa" for kind in ("s", "tare") for k in range(presses.SENSORS)))
+        )
+        reading, tare = np.reshape(pressures, (2, presses.SENSORS))
+        readings_Pa = (reading - (tare if "tare0_Pa" in names else 0.0)) / gains
+        there = readings_Pa[~np.isnan(readings_Pa)]
+        no_zero = len(there) > 0 and there.min() > ABSOLUTE_Pa
+        if no_zero and "tare0_Pa" not in names:
+            raise InputError("the readings are absolute pressures; subtract each sensor's zero, or give its column tare0_Pa, ...")
+        fits = len(there) >= SENSORS_MIN and there.max() > 0 and not no_zero
+        noise = noise_Pa if np.isnan(noise) else noise
+        rows.append(SimpleNamespace(first=cells[0], readings_Pa=readings_Pa, fits=fits, noise_Pa=noise, x_mm=x_mm, y_mm=y_mm))
+    return names[0], rows
 
 
 def print_optima(measure, options):
-    if options.file == "-":
-        return print_rows(measure, Table(sys.stdin, "standard input"), options.noise)
-    try:
-        with open(options.file, encoding="utf-8") as lines:
-            return print_rows(measure, Table(lines, options.file), options.noise)
-    except OSError:
-        raise InputError(f"{options.file}: cannot read it; does it exist?") from None
-
-
-def print_rows(measure, table, noise_Pa):
+    path = pathlib.Path("/dev/stdin" if options.file == "-" else options.file)
+    first, rows = read(read_lines(path), path, options.noise)
     compared = presses.Compared(measure)
-    names = [name for name, _ in FOUND]
-    print(table.names[0], *names, "location_sd_mm", "condition_number", "observable", "at_bound", "distance_mm", sep=",")
-    rows = list(table.rows(noise_Pa))
+    print(first, *(name for name, _ in FOUND), "location_sd_mm", "condition_number", "observable", "at_bound", "distance_mm", sep=",")
     for start in range(0, len(rows), ROWS_AT_ONCE):
         some = rows[start : start + ROWS_AT_ONCE]
         readings_Pa = np.array([row.readings_Pa for row in some])
@@ -119,20 +87,8 @@ def print_row(row, found):
     located = bool(found["observable"]) and np.nanmax(row.readings_Pa) >= presses.GATE_NOISES * row.noise_Pa
     distance_mm = np.hypot(found["x_mm"] - row.x_mm, found["y_mm"] - row.y_mm)
     cells = [f"{found[field]:.7g}" for _, field in FOUND] + [f"{found[field]:.4g}" for field in ("location_sd_mm", "condition_number")]
-    return print(
-        row.first,
-        *cells,
-        int(located),
-        int(found["at_bound"]),
-        f"{distance_mm:.5g}" if located and np.isfinite(distance_mm) else "",
-        sep=",",
-    )
-
-
-def noise(text):
-    if not 0.01 <= float(text) <= 10000:
-        raise argparse.ArgumentTypeError("from 0.01 to 10000")
-    return float(text)
+    cells += [int(located), int(found["at_bound"]), f"{distance_mm:.5g}" if located and np.isfinite(distance_mm) else ""]
+    return print(row.first, *cells, sep=",")
 
 
 def main(argv):
@@ -140,10 +96,9 @@ def main(argv):
     parser.add_argument("--build", default=ROOT / "build/host", metavar="DIR", help="build folder of the host tools (default: %(default)s)")
     parser.add_argument("command", choices=["fit"])
     parser.add_argument("file", nargs="?", default="-", metavar="FILE.csv", help="the readings; - is standard input, the default")
-    parser.add_argument(
-        "--noise", type=noise, default=5.0, metavar="PA", help="of a sensor, rms, without a column noise_Pa (default: %(default)s)"
-    )
+    parser.add_argument("--noise", type=float, default=5.0, metavar="PA", help="of a sensor, rms, without a column noise_Pa; default 5")
     options = parser.parse_args(argv)
+    check_range("noise", options.noise, 0.01, 10000)
     print_optima(Measure(options.build), options)
     return 0
 
