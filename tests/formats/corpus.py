@@ -186,9 +186,8 @@ def csv_cases(corpus, name, text, devices):
     add("no_info_packet", [line for line in lines if "packet: info" not in line])
     add("rows_twice", [*lines[: row + 1], *lines[row:]])
     add("rows_backwards", [*lines[: header + 1], *reversed(lines[header + 1 : -1]), lines[-1]])
-    add("head_only", lines[: header + 1])
-    add("no_header", lines[:header])
-    add("first_line", lines[:1])
+    for count in (1, header, header + 1):
+        add(f"lines_{count}", lines[:count])
     add("first_line_torn", text_of(lines[:1])[:-1])
     add("empty", b"")
     add("header_twice", [*lines[: header + 1], *lines[header:]])
@@ -470,17 +469,11 @@ def bag_cases(corpus, name, content, devices, chances):
             add(f"cut_{number}_{at - start}", content[:at])
         add(f"without_chunk_{number}", content[:start] + content[end:])
         add(f"chunk_twice_{number}", content[:end] + content[start:])
-        for what, at, data in (
-            ("crc", start + 33, b"\1\2\3\4"),
-            ("size", start + 25, struct.pack("<Q", 5)),
-            ("huge", start + 25, struct.pack("<Q", 1 << 62)),
-            ("no_crc", start + 33, bytes(4)),
-            ("name", start + 41, b"lz4x"),
-            ("unknown", start, b"\x7f"),
-            ("longer", start + 1, struct.pack("<Q", 1 << 40)),
-        ):
-            add(f"chunk_{number}_{what}", content[:at] + data + content[at + len(data) :])
-        add(f"chunk_{number}_size_and_no_crc", content[: start + 25] + struct.pack("<QI", 5, 0) + content[start + 37 :])
+        sizes = (struct.pack("<QI", 5, 0), struct.pack("<Q", 5), struct.pack("<Q", 1 << 62))  # the first without CRC
+        fields = [(start + 1, struct.pack("<Q", 1 << 40)), (start, b"\x7f"), (start + 41, b"lz4x"), *((start + 25, size) for size in sizes)]
+        fields += [(start + 33, crc) for crc in (b"\1\2\3\4", bytes(4))]
+        for field, (at, data) in enumerate(fields):
+            add(f"chunk_{number}_field_{field}", content[:at] + data + content[at + len(data) :])
     add("magic_only", content[:8])
     add("half_a_magic", content[:5])
     add("bytes_behind", content + b"hello")
@@ -500,16 +493,9 @@ def inner_cases(corpus, messages, devices):
     at = content.index(b"\x05", 60)  # the first message's record
     while content[at + 3 : at + 9] != bytes(6):
         at = content.index(b"\x05", at + 1)
-    for what, place, data in (
-        ("torn", at + 1, struct.pack("<Q", 1 << 30)),
-        ("shorter", at + 1, struct.pack("<Q", 3)),
-        ("empty", at + 1, struct.pack("<Q", 0)),
-        ("channel", at + 9, b"\x63"),
-        ("opcode", at, b"\x7f"),
-        ("chunk", at, b"\x06"),
-        ("end", at, b"\x0f"),
-    ):
-        corpus.recording(f"inner_{what}", content[:place] + data + content[place + len(data) :], "mcap", devices)
+    lengths = ((at + 1, struct.pack("<Q", length)) for length in (1 << 30, 3, 0))
+    for number, (place, data) in enumerate((*lengths, (at + 9, b"\x63"), *((at, opcode) for opcode in (b"\x7f", b"\x06", b"\x0f")))):
+        corpus.recording(f"inner_{number}", content[:place] + data + content[place + len(data) :], "mcap", devices)
 
 
 def frame_of(packet):

@@ -109,7 +109,7 @@ class Programs(contextlib.ExitStack):
 
 
 def keep(name, found, goals):
-    """Into NAME.json, which other jobs write to as well. The names of counts that missed their goal."""
+    """Into NAME.json, which other jobs write to as well. The names of counts that missed their goal, and of figures that were not measured."""
     verdicts = {}
     for goal, sign, limit in goals:
         value = found.get(goal)
@@ -119,7 +119,7 @@ def keep(name, found, goals):
     path = REPORT / f"{name}.json"
     whole = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
     figures.add(path, {**json.loads(json.dumps(found)), "goals": {**whole.get("goals", {}), **verdicts}})
-    return [goal for goal, verdict in verdicts.items() if verdict["met"] is False and not OF_TIME.search(goal)]
+    return [goal for goal, verdict in verdicts.items() if not verdict["met"] and (verdict["met"] is None or not OF_TIME.search(goal))]
 
 
 def main(argv):

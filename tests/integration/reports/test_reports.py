@@ -158,5 +158,15 @@ if NAME == "truth":
                     self.run_parts("gate")
 
 
+if NAME == "two":
+
+    class Nightly(unittest.TestCase):
+        def test_a_figure_that_was_not_measured_is_missed(self):
+            sys.path.insert(0, str(ROOT / "tests/nightly"))
+            nightly, found = importlib.import_module("nightly"), {"lost": None, "found": 0, "answer_s": 9}
+            with tempfile.TemporaryDirectory() as folder, mock.patch.object(nightly, "REPORT", pathlib.Path(folder)):
+                self.assertEqual(nightly.keep("tools", found, [(name, "<=", 1) for name in found]), ["lost"])
+
+
 if __name__ == "__main__":
     unittest.main(verbosity=2)
