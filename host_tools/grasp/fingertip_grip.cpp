@@ -19,34 +19,35 @@ static GripperTraits traits_of(const fingertip_grip_traits &given) {
       throw Error(ErrorCode::bad_value, "a gripper's traits are numbers of at least 0; stroke, step and speeds above 0");
     }
   }
+  if (given.speed_min_mm_s > given.speed_max_mm_s || given.force_min_N > given.force_max_N) {
+    throw Error(ErrorCode::bad_value, "a gripper's traits have a least speed or force above the largest");
+  }
   return {"gripper",         given.stroke_mm,   given.step_mm,   given.deadband_mm, given.speed_min_mm_s, given.speed_max_mm_s,
           given.force_min_N, given.force_max_N, given.latency_s, given.poll_s};
 }
 
-static GripSettings settings_of(const GripperTraits &traits, const char *const *names, const double *values, size_t count) {
-  std::map<std::string, double> wanted;
-  for (std::size_t i = 0; i < count && names && values; i++) {
+using Values = std::map<std::string, double>; // by the name of the option, in its unit
+
+// These, and those before that they leave.
+static Values merged(Values wanted, const char *const *names, const double *values, size_t count) {
+  for (std::size_t i = 0; i < count; i++) {
     const GraspSetting &setting = setting_of_field(names[i]);
     wanted[setting.name] = values[i] / setting.scale;
   }
-  try {
-    return settings_for(traits, wanted);
-  } catch (const Error &error) {
-    std::string text = error.what(); // it has the names of options
-    for (const GraspSetting &setting : grasp_settings()) {
-      const std::string option = std::string("--") + setting.name;
-      for (std::size_t at = 0; (at = text.find(option, at)) != std::string::npos;) {
-        text.replace(at, option.size(), field_name(setting));
-      }
-    }
-    throw Error(error.code(), text);
-  }
+  return wanted;
 }
+
+static bool has_null(const char *const *names, const double *values, size_t count) {
+  return count > 0 && (!names || !values || std::find(names, names + count, nullptr) != names + count);
+}
+
+static bool is_time(double t_s) { return std::isfinite(t_s) && t_s >= 0.0; }
 
 static fingertip_status null() { return failed(FINGERTIP_ERR_ARGUMENT, "a pointer is NULL"); }
 
 struct fingertip_grip {
   GripperTraits traits;
+  Values wanted;
   GripSettings settings;
   Grip grip;
 };
@@ -55,12 +56,13 @@ struct fingertip_grip *fingertip_grip_new(const struct fingertip_grip_traits *tr
                                           size_t count) {
   fingertip_grip *made = nullptr;
   guarded([&] {
-    if (!traits) {
+    if (!traits || has_null(names, values, count)) {
       return null();
     }
     const GripperTraits own = traits_of(*traits);
-    const GripSettings settings = settings_of(own, names, values, count);
-    made = new fingertip_grip{own, settings, Grip(settings, own)};
+    const Values wanted = merged({}, names, values, count);
+    const GripSettings settings = settings_for(own, wanted, field_name);
+    made = new fingertip_grip{own, wanted, settings, Grip(settings, own)};
     return FINGERTIP_OK;
   });
   return made;
@@ -70,14 +72,16 @@ void fingertip_grip_free(struct fingertip_grip *grip) { delete grip; }
 
 enum fingertip_status fingertip_grip_set(struct fingertip_grip *grip, const char *const *names, const double *values, size_t count) {
   return guarded([&] {
-    if (!grip) {
+    if (!grip || has_null(names, values, count)) {
       return null();
     }
-    const GripSettings settings = settings_of(grip->traits, names, values, count);
+    Values wanted = merged(grip->wanted, names, values, count);
+    const GripSettings settings = settings_for(grip->traits, wanted, field_name);
     if (!grip->grip.change(settings)) {
       return failed(FINGERTIP_ERR_VALUE, "the mode cannot change: set_N chooses it at the beginning");
     }
     grip->settings = settings;
+    grip->wanted = std::move(wanted);
     return FINGERTIP_OK;
   });
 }
@@ -96,7 +100,7 @@ enum fingertip_status fingertip_grip_setting(const struct fingertip_grip *grip, 
 enum fingertip_status fingertip_grip_take_contact(struct fingertip_grip *grip, size_t finger, double t_s, const double *values,
                                                   size_t count) {
   return guarded([&] {
-    if (!grip || !values || finger >= GRIP_FINGERS || count != count_of(WIRE_CONTACT) || !(t_s >= 0.0)) {
+    if (!grip || !values || finger >= GRIP_FINGERS || count != count_of(WIRE_CONTACT) || !is_time(t_s)) {
       return failed(FINGERTIP_ERR_ARGUMENT, "give a contact packet's numbers, finger 0 or 1, and a time");
     }
     double numbers[FINGERTIP_VALUES_MOST];
@@ -108,7 +112,7 @@ enum fingertip_status fingertip_grip_take_contact(struct fingertip_grip *grip, s
 }
 
 enum fingertip_status fingertip_grip_take_answer(struct fingertip_grip *grip, const struct fingertip_grip_answer *answer) {
-  if (!grip || !answer || !(answer->t_s >= 0.0) || !std::isfinite(answer->width_mm)) {
+  if (!grip || !answer || !is_time(answer->t_s) || !std::isfinite(answer->width_mm)) {
     return failed(FINGERTIP_ERR_ARGUMENT, "an answer has a time and a width");
   }
   GripperStatus status;
@@ -127,7 +131,7 @@ enum fingertip_status fingertip_grip_ask(struct fingertip_grip *grip, enum finge
 
 enum fingertip_status fingertip_grip_step(struct fingertip_grip *grip, double now_s, struct fingertip_grip_command *command,
                                           struct fingertip_grip_report *report) {
-  if (!grip || !command || !report || !(now_s >= 0.0)) {
+  if (!grip || !command || !report || !is_time(now_s)) {
     return failed(FINGERTIP_ERR_ARGUMENT, "give a time, and where to write command and report");
   }
   GripCommand out;

@@ -11,8 +11,8 @@
  *   }
  *
  * Handles, threads and errors: see fingertip.h. Forces are N, lengths mm, of one fingertip: its normal force is the grip force. Times are
- * s, at least 0, on one clock of the caller's for all inputs; the library has none. What a step and its inputs do is decided by these
- * inputs alone. They wait for nothing and allocate nothing, errors apart. Together they take about 2 us on a desktop computer. */
+ * s, finite and at least 0, on one clock of the caller's for all inputs; the library has none. What a step and its inputs do is decided by
+ * these inputs alone. They wait for nothing and allocate nothing, errors apart. Together they take about 2 us on a desktop computer. */
 #ifndef FINGERTIP_GRIP_H
 #define FINGERTIP_GRIP_H
 
@@ -94,7 +94,7 @@ enum fingertip_grip_motion {
   GRIP_MOVE
 };
 
-/* Of the gripper, all at least 0; stroke, step and both speeds above 0. gripper.hpp has the same
+/* Of the gripper, all at least 0; stroke, step and both speeds above 0; each least at most the largest. gripper.hpp has the same
  * fields; grip_table.py lists those of the known models. */
 struct fingertip_grip_traits {
   double stroke_mm;   /* width between the pads when open */
@@ -134,14 +134,16 @@ struct fingertip_grip_report {
   double delay_s; /* from a fingertip's measurement to the controller */
 };
 
-/* Settings: settings.hpp has their names (cap_N, mass_kg, ...), in the units of these names. A setting that is not given has the gripper's
- * default. set_N chooses the mode that holds this force. NULL: fingertip_error has the setting and its range. */
+/* Settings, in the units of their names: set_N, which chooses the mode that holds this force, cap_N, travel_cap_mm, start_N, floor_N,
+ * blind_N, friction, margin, slid, decay_1_s, rest_s, pull_N, mass_kg, lift_m_s2, touch_N, approach_mm_s, release_mm_s, release_width_mm,
+ * stale_s, late_s, silent_s, differ, kp_mm_N, ki_mm_Ns, kd_mm_s_N, control_s; `fingertip grasp --help` describes them in this order.
+ * A setting that is not given has the gripper's default. NULL: fingertip_error has the setting and its range. */
 struct fingertip_grip;
 struct fingertip_grip *fingertip_grip_new(const struct fingertip_grip_traits *traits, const char *const *names, const double *values,
                                           size_t count);
 void fingertip_grip_free(struct fingertip_grip *grip);
-/* Other settings from the next step on, in any state; what is not given has its default again. FINGERTIP_ERR_VALUE: out
- * of range, or of the other mode; all stay as they were. */
+/* Other settings from the next step on, in any state; what is not given stays. FINGERTIP_ERR_VALUE: out of range, or of the
+ * other mode; all stay as they were. */
 enum fingertip_status fingertip_grip_set(struct fingertip_grip *grip, const char *const *names, const double *values, size_t count);
 enum fingertip_status fingertip_grip_setting(const struct fingertip_grip *grip, const char *name, double *value);
 

@@ -53,6 +53,8 @@ const std::vector<GraspSetting> &grasp_settings() {
   return all;
 }
 
+std::string option_name(const GraspSetting &setting) { return std::string("--") + setting.name; }
+
 std::string field_name(const GraspSetting &setting) { return std::string(split(setting.path, '.').back()); }
 
 const GraspSetting &setting_of_field(const std::string &name) {
@@ -100,7 +102,7 @@ std::map<std::string, double> limits_of(const std::vector<std::string_view> &wor
   return values;
 }
 
-GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted) {
+GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted, SettingName called) {
   GripSettings settings = default_settings(traits);
   settings.mode = wanted.count(FIXED) != 0 ? GRIP_MODE_FIXED : GRIP_MODE_HOLD;
   for (const GraspSetting &setting : grasp_settings()) {
@@ -109,30 +111,36 @@ GripSettings settings_for(const GripperTraits &traits, const std::map<std::strin
       continue;
     }
     if (!(value->second >= setting.low && value->second <= setting.high)) {
-      impossible("--" + std::string(setting.name) + " is not possible; give " + shortest(static_cast<float>(setting.low)) + " to " +
-                 shortest(static_cast<float>(setting.high)) + (*setting.unit ? " " : "") + setting.unit);
+      const double scale = called == field_name ? setting.scale : 1.0;
+      const std::string unit = scale == 1.0 && *setting.unit ? std::string(" ") + setting.unit : "";
+      impossible(called(setting) + " is not possible; give " + shortest(static_cast<float>(scale * setting.low)) + " to " +
+                 shortest(static_cast<float>(scale * setting.high)) + unit);
     }
     setting.field(settings) = value->second * setting.scale;
   }
+  const auto name_of = [&](const char *name) {
+    return called(*find_in(grasp_settings(), [&](const GraspSetting &setting) { return name == std::string(setting.name); }));
+  };
   const auto follow = [&](const char *name, double &field, double low, double high, const std::string &limit) {
     if (field < low || field > high) {
       if (wanted.count(name) != 0) {
-        impossible("--" + std::string(name) + " is not possible; " + limit);
+        impossible(name_of(name) + " is not possible; " + limit);
       }
       field = std::clamp(field, low, high); // a default gives way to what was asked for
     }
   };
   const double cap_N = settings.cap_N;
+  const std::string above_cap = "it is above " + name_of("cap");
   follow("open-width", settings.release_width_mm, 0.0, traits.stroke_mm, traits.model + " opens to " + fixed(traits.stroke_mm, 1) + " mm");
-  follow(FIXED, settings.set_N, 0.0, cap_N, "it is above --cap");
-  follow("start", settings.start_N, 0.0, cap_N, "it is above --cap");
-  follow("floor", settings.floor_N, 0.0, cap_N, "it is above --cap");
-  follow("blind", settings.blind_N, settings.start_N, cap_N, "it must lie between --start and --cap");
+  follow(FIXED, settings.set_N, 0.0, cap_N, above_cap);
+  follow("start", settings.start_N, 0.0, cap_N, above_cap);
+  follow("floor", settings.floor_N, 0.0, cap_N, above_cap);
+  follow("blind", settings.blind_N, settings.start_N, cap_N, "it must lie between " + name_of("start") + " and " + name_of("cap"));
   const double least_mm = traits.step_mm * std::max(1.0, std::ceil(traits.deadband_mm / std::max(traits.step_mm, 1e-6) - 1e-9));
   const double step_N = GripBound::first_N(least_mm);
   if (step_N > cap_N) {
     impossible("the least move of a " + traits.model + ", " + fixed(least_mm, 2) + " mm, may press with " + fixed(step_N, 1) +
-               " N, and the cap is " + fixed(cap_N, 1) + " N; take a gripper of finer steps, or a higher --cap");
+               " N, and the cap is " + fixed(cap_N, 1) + " N; take a gripper of finer steps, or a higher " + name_of("cap"));
   }
   return settings;
 }

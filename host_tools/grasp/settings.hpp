@@ -40,9 +40,12 @@ std::map<std::string, double> breaking_values(double breaks_N);
 // Of NAME=VALUE each. Throws Error, bad_value.
 std::map<std::string, double> limits_of(const std::vector<std::string_view> &words);
 
+// How a message names a setting and its range: as an option in its unit, or field_name in that of the field.
+using SettingName = std::string (*)(const GraspSetting &setting);
+std::string option_name(const GraspSetting &setting);
 // Defaults of this gripper, overridden by the wanted values, by name. "fixed" chooses that mode. Throws Error, code
 // bad_value: a value out of range, or one that contradicts another; a gripper one of whose steps may exceed the cap.
-GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted);
+GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted, SettingName called = option_name);
 
 // For a recording's head: grasp_mode, grasp_touch_N, ...
 Metadata settings_metadata(const GripSettings &settings);

@@ -26,7 +26,8 @@ constexpr double FORCE_SD_MOST = 1.0;
 // A tangential force with one of these flags is not trusted.
 constexpr std::uint32_t FORCE_ONLY =
     CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SATURATED | CONTACT_FLAG_ZERO_DOUBTFUL;
-// A place with one of these flags is not trusted. UNCERTAIN says that a pull may have moved it, which is what it is for.
+// A place with one of these flags is not trusted. UNCERTAIN is: a tangential force may have moved the place, which is what shows that
+// force.
 constexpr std::uint32_t NO_PLACE = FORCE_ONLY & ~std::uint32_t{CONTACT_FLAG_UNCERTAIN};
 // A tangential force as large as the normal one moves the Gaussian by this many sigmas at least, whatever the shape, but by
 // no more than 3.75 to 5 mm on 12 mm of rubber, however wide the contact is (unit.cell.face).

@@ -40,7 +40,7 @@ struct GripSettings {
   double margin = 1.3;    // grip over load / friction; more if frames are late
   double slid = 1.05;     // factor on the margin after the first slide
   double decay_1_s = 5.0; // share of an excess of grip that decays in a second
-  double pull_N = 0.6;    // HAND_OVER: the load of a fingertip changes by so much
+  double pull_N = 0.6;    // HAND_OVER: change of a fingertip's load
   double rest_s = 0.3;    // no decay for this time after a slide
   double mass_kg = 0.0;   // expected mass of the object: the load is taken to be its weight at least; 0: unknown
   double lift_m_s2 = 1.0; // acceleration that the expected mass gets before the load is known

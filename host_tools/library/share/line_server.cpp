@@ -2,6 +2,7 @@
 
 #include "libfingertip/descriptor_transport.hpp"
 #include "libfingertip/error.hpp"
+#include "libfingertip/share_socket.hpp"
 
 #include <cerrno>
 #include <cstring>
@@ -23,6 +24,9 @@ LineServer::LineServer(const std::string &path, Clients clients) : path_(path), 
   sockaddr_un address;
   bool listens = unix_address(path_, &address);
   if (listens) {
+    if (SocketTransport::is_served(path_)) {
+      throw Error(ErrorCode::port_in_use, path_ + ": another program listens there");
+    }
     unlink(path_.c_str());
     listening_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
     const mode_t mask = umask(0177);

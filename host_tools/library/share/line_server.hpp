@@ -16,7 +16,7 @@ public:
     std::function<void(int client)> leaves = [](int) {};
   };
 
-  /* Replaces a socket that a killed program left. Throws Error: it cannot listen there. */
+  /* Replaces a socket that a killed program left. Throws Error: it cannot listen there, or another program does. */
   LineServer(const std::string &path, Clients clients);
   ~LineServer();
   LineServer(const LineServer &) = delete;

@@ -30,6 +30,7 @@ from .frames import Frame
 from .grip_table import TRAITS as TRAITS, Motion as Motion, Request as Request, Settings, State, Traits, Trouble
 from .version import __version__
 
+_AGAIN_s = 0.1  # a command may be lost on its way
 _OTHER = -9  # FINGERTIP_ERR_OTHER: all other errors are the caller's
 
 
@@ -56,7 +57,7 @@ class Gripper(Protocol):
         """None: no new answer. Without any for the setting silent_s the gripper counts as silent."""
 
     def move(self, width_mm: float, speed_mm_s: float, force_N: float) -> None:
-        """Called where one of these has changed. force_N: for its own limit of force, if it has one."""
+        """Called where one of these has changed, and again each 0.1 s, since one may be lost on its way. force_N: for its own limit of force, if it has one."""
 
 
 class Command(NamedTuple):
@@ -134,7 +135,7 @@ class Grip:
         weakref.finalize(self, self._c.fingertip_grip_free, self._handle)
         self._values = (ctypes.c_double * self._c.fingertip_value_count(1))()
         self._command, self._report = _Command(), _Report()
-        self._sent: Command | None = None
+        self._sent: tuple[Command | None, float] = (None, 0.0)
 
     def _do(self, name: str, *arguments: Any) -> bool:
         status = getattr(self._c, f"fingertip_grip_{name}")(self._handle, *arguments)
@@ -143,7 +144,7 @@ class Grip:
         return bool(status == 0)
 
     def set(self, settings: Settings) -> None:
-        """Other settings from the next step on, in any state; all but the mode may change. Raises BadValueError: all stay as they were."""
+        """From the next step on, in any state; what is None stays as it is. All but the mode may change. Raises BadValueError: nothing changes."""
         self._do("set", *_given(settings))
 
     def setting(self, name: str) -> float:
@@ -167,7 +168,7 @@ class Grip:
 
     def answer(self, answer: Answer, now_s: float) -> None:
         width_mm, moving, active, fault, time_s = answer
-        given = _Answer(width_mm, bool(moving), bool(active), int(fault), now_s if time_s is None else time_s)
+        given = _Answer(width_mm, bool(moving), bool(active), min(int(fault), 255), now_s if time_s is None else time_s)
         self._do("take_answer", ctypes.byref(given))
 
     def step(self, now_s: float) -> tuple[Command, Report]:
@@ -185,8 +186,9 @@ class Grip:
         if answer is not None:
             self.answer(answer, now_s)
         command, report = self.step(now_s)
-        if command.motion == Motion.MOVE and command != self._sent:
-            self._sent = command
+        sent, sent_s = self._sent
+        if command.motion == Motion.MOVE and (command != sent or now_s - sent_s >= _AGAIN_s):
+            self._sent = command, now_s
             gripper.move(*command[:3])
         return report
 

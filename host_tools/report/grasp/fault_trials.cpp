@@ -204,7 +204,7 @@ nlohmann::ordered_json row_of(const FaultTrial &one, double may_open_mm) {
           {"object", one.thing.name},
           {"begun", failed.begun},
           {"untold", one.is_untold},
-          {"said", trouble_names(failed.trouble)},
+          {"reported", trouble_names(failed.trouble)},
           {"ends", state_name(failed.state)},
           {"opened_mm", failed.opened_mm},
           {"peak_N", outcome.peak_N},

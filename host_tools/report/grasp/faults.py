@@ -21,7 +21,7 @@ def table_of(rows):
             "state": state,
             "untold": untold,
             "grasps": len(group),
-            "said": joined(group, "said"),
+            "reported": joined(group, "reported"),
             "ends": joined(group, "ends"),
             "opened_mm": max(row["opened_mm"] for row in group),
             "peak_N": max(row["peak_N"] for row in group),
@@ -37,12 +37,12 @@ def measure(build):
     never = [row for row in rows if not row["begun"]]
     if never:
         raise InputError(f"{never[0]['fault']} never began in {never[0]['state']}: the grasp came not so far")
-    told = [row for row in rows if not row["untold"]]
+    judged = [row for row in rows if not row["untold"]]
     return {
         "faults": table_of(rows),
         "faults_grasps": len(rows),
-        "faults_opened": sum(row["opened"] for row in told),
-        "faults_beyond_cap": sum(row["beyond_cap"] for row in told),
-        "faults_unsaid": sum(row["unsaid"] for row in told),
-        "cups_crushed": sum(row["crushed"] for row in told),
+        "faults_opened": sum(row["opened"] for row in judged),
+        "faults_beyond_cap": sum(row["beyond_cap"] for row in judged),
+        "faults_unsaid": sum(row["unsaid"] for row in judged),
+        "cups_crushed": sum(row["crushed"] for row in judged),
     }

@@ -240,7 +240,7 @@ public:
   //   by ms after it: measured_ms the first frame that reported it, sent_ms the packet that left its
   //   chip whole, answered_ms the controller's command, asked_ms on the gripper's line, moved_ms
   //   the fingers, reaction_ms 5 % more force; null: never
-  // told_by: "SLIDING", or "load" if a fingertip's load rose by a tenth and 0.1 N.
+  // reported_by: "SLIDING", or "load" if a fingertip's load rose by a tenth and 0.1 N.
   ordered_json summary() const {
     ordered_json out;
     out["dropped"] = dropped_;

@@ -17,17 +17,18 @@ constexpr double JOINED_s = 0.03; // what goes on after less rest is one slip
 
 struct Known {
   Event::Kind kind;
-  double low, high, seconds;
+  double low, high, seconds; // the last 0: as the amount
 };
 // Ranges keep the physics within its steps.
 constexpr Known KNOWN[] = {{Event::Kind::pour, 0.0, 5.0, 1.0},
                            {Event::Kind::jerk, 0.0, 20.0, 0.3},
                            {Event::Kind::knock, 0.0, 0.5, 0.02},
-                           {Event::Kind::slick, 0.0, 0.95, 0.5}};
+                           {Event::Kind::slick, 0.0, 0.95, 0.5},
+                           {Event::Kind::lower, 0.2, 10.0, 0.0}};
 
 Event event_of(Event::Kind kind, double begin_s, double amount) {
   const auto known = std::find_if(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return one.kind == kind; });
-  return {kind, begin_s, known->seconds, amount};
+  return {kind, begin_s, known->seconds > 0.0 ? known->seconds : amount, amount};
 }
 
 KindOfGrasp grasp_of(const World::Options &options) {
@@ -53,7 +54,7 @@ Planned planned(const std::string &text) {
   }
   throw Error(ErrorCode::bad_value, "\"" + text +
                                         "\" is no disturbance; give pour:0..5 (masses), jerk:0..20 (m/s2), knock:0..0.5 "
-                                        "(m/s) or slick:0..0.95 (share of friction), and @SECONDS after the lift");
+                                        "(m/s), slick:0..0.95 (share of friction) or lower:0.2..10 (s), and @SECONDS after the lift");
 }
 
 bool is_disturbance(const std::string &name) {
@@ -141,7 +142,7 @@ void World::watch_object() {
     slid_before_mm_ = cell_.slid_mm();
   }
   const Vector way = cell_.way_mm();
-  const bool in_the_air = lift_s_ && since_s >= grasp_.lift_s;
+  const bool in_the_air = lift_s_ && !grasp_.inputs(since_s).table;
   if (std::hypot(way.x, way.y) >= DROP_mm || (in_the_air && cell_.mean_N() < LOST_N)) {
     is_dropped_ = true;
     is_there_ = false;

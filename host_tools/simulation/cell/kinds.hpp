@@ -22,7 +22,7 @@ struct Vector {
 // Of the object: what touches the pads is a point (ball, egg), a line (upright, lying, cup) or an area.
 enum class Shape {
   ball,
-  egg, // stands
+  egg, // upright
   box,
   plate,   // a box, thin along the grip's axis
   upright, // cylinder
@@ -50,6 +50,7 @@ struct Event {
     carry,   // the hand's largest acceleration, m/s2, on a way of minimum jerk
     slick,   // share of friction that goes
     jerk,    // the hand's acceleration, m/s2, one period of a sine; no kind draws it
+    lower,   // back onto the table, minimum jerk, in amount seconds; no kind draws it
   };
   Kind kind;
   double begin_s, seconds, amount;

@@ -287,7 +287,7 @@ private:
     return true;
   }
 
-  static constexpr const char *COMMANDS = "give lift, take, pour|jerk|knock|slick AMOUNT once it is lifted, kill|freeze|thaw "
+  static constexpr const char *COMMANDS = "give lift, take, pour|jerk|knock|slick|lower AMOUNT once it is lifted, kill|freeze|thaw "
                                           "left|right, line none|silent|garbage|damaged|other_slave|refused, late MS, latency_timer "
                                           "MS, power on|off, fault CODE, at_touch COMMAND; COMMAND..., truth, or quit";
 

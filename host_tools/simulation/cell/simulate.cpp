@@ -180,8 +180,8 @@ int main(int argc, char **argv) {
   CLI::Option *after = lift_number("--lift-after", lift_after_s, "S", 0.1, 1e6, "Lift once the force has been steady for this time");
   of_lift.push_back(app.add_flag("--by-command", by_command, "Lift only on the command")->excludes(after));
   of_lift.push_back(app.add_option("--then", planned_texts,
-                                   "A disturbance: pour:MASSES, jerk:M/S2, knock:M/S or "
-                                   "slick:SHARE, @SECONDS after the lift")
+                                   "A disturbance: pour:MASSES, jerk:M/S2, knock:M/S, slick:SHARE, or lower:SECONDS onto "
+                                   "the table, @SECONDS after the lift")
                         ->type_name("KIND:AMOUNT@S"));
   lift_number("--gain-error", options.lift.gain_sd, "SHARE", 0.0, 0.2, "That calibration left of the gains");
   lift_number("--patience", options.lift.patience_s, "S", 0.0, 3600.0,

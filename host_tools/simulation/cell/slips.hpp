@@ -8,7 +8,7 @@
 namespace fingertip::cell {
 
 constexpr double SLIP_mm = 0.3;  // a slide by less is none
-constexpr double DROP_mm = 22.0; // what slid by so much is dropped
+constexpr double DROP_mm = 22.0; // what slid by this is dropped
 
 // All of both contacts slid, by SLIP_mm or more in all.
 struct Slip {

@@ -40,11 +40,28 @@ class Names(unittest.TestCase):
             self.assertGreaterEqual(made.setting(field.name), 0)
         self.assertRaisesRegex(BadValueError, "no setting grip_N", made.setting, "grip_N")
         made.set(grip.Settings(cap_N=30))
-        self.assertEqual((made.setting("mass_kg"), made.setting("cap_N")), (0.0, 30.0))
-        self.assertRaisesRegex(BadValueError, "cap_N is not possible; give 0.5 to 100 N", made.set, grip.Settings(cap_N=200))
+        self.assertEqual((made.setting("mass_kg"), made.setting("cap_N")), (0.5, 30.0))
+        for wrong, words in (
+            ({"cap_N": 200}, "cap_N is not possible; give 0.5 to 100 N"),
+            ({"start_N": 31}, "start_N .* above cap_N"),
+            ({"decay_1_s": 21}, "decay_1_s .* 0 to 20$"),
+        ):
+            self.assertRaisesRegex(BadValueError, words, made.set, grip.Settings(**wrong))
         self.assertRaisesRegex(BadValueError, "mode", made.set, grip.Settings(set_N=3))
         self.assertRaisesRegex(BadValueError, "traits", grip.Grip, grip.Traits(*[0.0] * 9))
         self.assertEqual(made.setting("cap_N"), 30.0)
+
+    def test_a_command_that_may_be_lost_is_sent_again(self):
+        made, moves, answers = grip.Grip(TRAITS), [], [grip.Answer(50.0)]
+        gripper = types.SimpleNamespace(poll=lambda: answers[-1], move=lambda *command: moves.append(command))
+        made.request(grip.Request.GRASP)
+        for i in range(42):
+            made.drive(gripper, 1 + 0.01 * i)
+        self.assertEqual((len(moves), len(set(moves))), (5, 1))
+        answers.append(grip.Answer(50.0, fault=256))
+        for i in range(3):
+            self.assertEqual(made.drive(gripper, 2 + 0.01 * i).gripper_fault, 255)
+        self.assertEqual(made.drive(gripper, 3).state, grip.State.FAULT)
 
 
 class Replayed(WorldCase):
@@ -118,11 +135,11 @@ class Example(unittest.TestCase):
         program = next(code for code in re.findall(r"```python\n(.*?)```", text, re.S) if "class HandE" in code)
         self.assertIn("/dev/ttyUSB0", program)
         program = program.replace("/dev/ttyUSB0", f"{folder}/fingertip/simulated/gripper")
-        with simulated(FINGERTIP, environment, "--lift", "--gripper", "hande", "--cache", TABLES):
+        with simulated(FINGERTIP, environment, "--lift", "--gripper", "hande", "--then", "lower:1@1", "--cache", TABLES):
             done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment, timeout=PATIENCE_s)
         self.assertEqual(done.returncode, 0, done.stderr)
         states = [line.split()[0] for line in done.stdout.splitlines()]
-        for earlier, later in itertools.pairwise("APPROACH SQUEEZE READY HOLDING RELEASE OPEN".split()):
+        for earlier, later in itertools.pairwise("APPROACH SQUEEZE READY HOLDING PLACING RELEASE OPEN".split()):
             self.assertLess(states.index(earlier), states.index(later), done.stdout)
 
 

@@ -1,6 +1,8 @@
 #include "grasp/fingertip.hpp"
 #include "support/host_packets.hpp"
 
+#include <algorithm>
+#include <array>
 #include <gtest/gtest.h>
 #include <limits>
 
@@ -8,19 +10,16 @@ using namespace fingertip;
 
 TEST(Convert, ATouchIsThePacketsContact) {
   wire_packet packet = test::make_contact(0, 1, 7);
-  packet.body.contact.force_N = 4.0196f;
   const GripTouch touch = touch_from_packet(packet, 1234567.8);
   EXPECT_NEAR(touch.t_s, 1.2345678, 1e-9);
   EXPECT_EQ(touch.flags, packet.body.contact.flags);
-  EXPECT_FLOAT_EQ(static_cast<float>(touch.force_N), 4.0196f);
-  EXPECT_EQ(static_cast<float>(touch.x_mm), packet.body.contact.x_mm);
-  EXPECT_EQ(static_cast<float>(touch.y_mm), packet.body.contact.y_mm);
-  EXPECT_EQ(static_cast<float>(touch.sigma_mm), packet.body.contact.sigma_mm);
-  EXPECT_EQ(static_cast<float>(touch.qx_N), packet.body.contact.qx_N);
-  EXPECT_EQ(static_cast<float>(touch.qy_N), packet.body.contact.qy_N);
-  EXPECT_EQ(static_cast<float>(touch.q_sd_N), packet.body.contact.q_sd_N);
-  EXPECT_EQ(static_cast<float>(touch.speed_x_mm_s), packet.body.contact.vx_mm_s);
-  EXPECT_EQ(static_cast<float>(touch.speed_y_mm_s), packet.body.contact.vy_mm_s);
+  const wire_contact &given = packet.body.contact;
+  const std::array<double, 8> found = {touch.force_N, touch.x_mm, touch.y_mm,         touch.sigma_mm,
+                                       touch.qx_N,    touch.qy_N, touch.speed_x_mm_s, touch.speed_y_mm_s};
+  const std::array<float, 8> sent = {given.force_N, given.x_mm, given.y_mm,    given.sigma_mm,
+                                     given.qx_N,    given.qy_N, given.vx_mm_s, given.vy_mm_s};
+  EXPECT_TRUE(std::equal(found.begin(), found.end(), sent.begin()));
+  EXPECT_EQ(touch.q_sd_N, double{given.q_sd_N});
 }
 
 TEST(Convert, WhatHasNoFlagOrIsNoNumberIsZero) {

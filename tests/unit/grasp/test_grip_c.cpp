@@ -99,3 +99,25 @@ TEST(GripC, GivesTheCommandsOfTheClass) {
   }
   EXPECT_GT(most_N, 2.0);
 }
+
+TEST(GripC, RefusesWhatIsNone) {
+  const char *names[] = {"cap_N", nullptr};
+  const double cap_N[] = {9, 9};
+  fingertip_grip_traits swapped[] = {TRAITS, TRAITS};
+  swapped[0].speed_min_mm_s = 151;
+  swapped[1].force_min_N = 101;
+  for (const fingertip_grip_traits &traits : swapped) {
+    EXPECT_EQ(fingertip_grip_new(&traits, nullptr, nullptr, 0), nullptr);
+  }
+  EXPECT_EQ(fingertip_grip_new(&TRAITS, names, cap_N, 2), nullptr);
+  EXPECT_EQ(fingertip_grip_new(&TRAITS, nullptr, cap_N, 1), nullptr);
+  const std::unique_ptr<fingertip_grip, void (*)(fingertip_grip *)> grip(fingertip_grip_new(&TRAITS, names, cap_N, 1), fingertip_grip_free);
+  EXPECT_EQ(fingertip_grip_set(grip.get(), names, cap_N, 2), FINGERTIP_ERR_ARGUMENT);
+  const double values[FINGERTIP_VALUES_MOST] = {};
+  const fingertip_grip_answer answer = {40, 0, 1, 0, INFINITY};
+  fingertip_grip_command command = {};
+  fingertip_grip_report report = {};
+  EXPECT_EQ(fingertip_grip_take_contact(grip.get(), 0, INFINITY, values, fingertip_value_count(WIRE_CONTACT)), FINGERTIP_ERR_ARGUMENT);
+  EXPECT_EQ(fingertip_grip_take_answer(grip.get(), &answer), FINGERTIP_ERR_ARGUMENT);
+  EXPECT_EQ(fingertip_grip_step(grip.get(), INFINITY, &command, &report), FINGERTIP_ERR_ARGUMENT);
+}

@@ -95,16 +95,3 @@ TEST(GraspSettings, AGripperWhoseStepExceedsTheCapIsRefused) {
   EXPECT_EQ(error_of(preset_values("cup")), "");
   EXPECT_NO_THROW(settings_for(gripper_traits("sts3215"), preset_values("crisp")));
 }
-
-TEST(GraspSettings, ARecordingTellsThemAll) {
-  const Metadata head = settings_metadata(settings_for(any(), {{"fixed", 4}, {"travel-cap", 7.5}, {"margin", 1.4}, {"slid", 1.5}}));
-  const auto has = [&](const std::string &key, const std::string &value) {
-    return std::find(head.begin(), head.end(), std::pair(key, value)) != head.end();
-  };
-  EXPECT_TRUE(has("grasp_mode", "fixed"));
-  EXPECT_TRUE(has("grasp_fixed", "4 N"));
-  EXPECT_TRUE(has("grasp_travel_cap", "7.5 mm"));
-  EXPECT_TRUE(has("grasp_margin", "1.4"));
-  EXPECT_TRUE(has("grasp_slid", "1.5"));
-  EXPECT_EQ(head.size(), grasp_settings().size() + 1);
-}

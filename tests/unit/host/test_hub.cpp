@@ -1,10 +1,14 @@
 #include "libfingertip/command.hpp"
 #include "libfingertip/decoder.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/share_socket.hpp"
 #include "library/share/hub.hpp"
+#include "library/share/line_server.hpp"
 #include "support/host_packets.hpp"
 
 #include <algorithm>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 using namespace fingertip;
 using std::chrono::milliseconds;
@@ -473,4 +477,11 @@ TEST_F(HubTest, AJoinInTheMiddleOfAFrameIsNoDamage) {
   hub.from_line(bytes.data() + 30, bytes.size() - 30);
   read(one);
   EXPECT_EQ(one.decoder.statistics().bytes, 0u);
+}
+
+TEST(LineServer, LeavesTheSocketOfALiveOne) {
+  const std::string path = testing::TempDir() + "fingertip-lines-" + std::to_string(getpid());
+  const LineServer first(path, {});
+  EXPECT_THROW(LineServer(path, {}), Error);
+  EXPECT_TRUE(SocketTransport::is_served(path));
 }

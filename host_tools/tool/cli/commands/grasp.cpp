@@ -189,10 +189,14 @@ private:
     words.resize(words.size() - (request ? 1 : 0));
     event("request " + line);
     try {
+      const std::map<std::string, double> before = limits_;
       std::map<std::string, double> limits = limits_of(words);
-      limits.insert(limits_.begin(), limits_.end());
-      return change(limits) && (!request || wish(*request, request_name(*request))) ? "ok"
-                                                                                    : "error cannot be while it is " + state_name(state());
+      limits.insert(before.begin(), before.end());
+      if (change(limits) && (!request || wish(*request, request_name(*request)))) {
+        return "ok";
+      }
+      change(before);
+      return "error cannot be while it is " + state_name(state());
     } catch (const Error &error) {
       return std::string("error ") + error.what();
     }
