@@ -2,8 +2,8 @@
 """Draws all pictures and tables of the boards that follow from the boards' descriptors and the sensors' geometry.
 
 draw.py            writes them
-draw.py --check    lists those that differ from what would be written
-draw.py --lay      lays circuit boards: seconds for each boards/<board>/pcb, into the .kicad_pcb there; then run draw.py
+draw.py --lay      lays circuit boards: a minute for each boards/<board>/pcb, into the .kicad_pcb there; then run draw.py
+--check with either lists those that differ from what would be written
 
 boards/<board>/wiring.svg                  from board.json
 boards/<board>/README.md, wiring and parts from board.json and parts.json
@@ -90,15 +90,15 @@ def drawings(root):
 
 
 def main(argv, root=HERE.parents[1]):
-    if argv not in ([], ["--check"], ["--lay"]):
+    if argv not in ([], ["--check"], ["--lay"], ["--lay", "--check"]):
         print(__doc__, file=sys.stderr)
         return 2
     try:
-        found = laid(root) if argv == ["--lay"] else drawings(root)
+        found = laid(root) if "--lay" in argv else drawings(root)
     except wiring.Unwired as error:
         print(f"draw.py: {error}", file=sys.stderr)
         return 1
-    if argv != ["--check"]:
+    if "--check" not in argv:
         for path, text in found.items():
             path.write_text(text, encoding="utf-8")
         return 0
