@@ -441,16 +441,11 @@ def message_cases(corpus, name, bag, devices):
         data = plain[:length_at] + struct.pack("<I", length) + plain[length_at + 4 :]
         add(f"line_length_{length}", lambda kind, row, data=data: [(LINE_TYPE, data)])
     first = next(number for number, (kind, _) in enumerate(messages) if kind == CONTACT_TYPE)
-    for what, kept in {
-        "head_missing": messages[first - 1 :],
-        "head_only": messages[:first],
-        "nothing": [],
-        "header_missing": messages[: first - 1] + messages[first:],
-        "first_missing": messages[1:],
-        "contacts_only": [(kind, {**row, "has_raw": False}) for kind, row in messages[first:] if kind == CONTACT_TYPE],
-        "blank_in_head": [messages[0], (LINE_TYPE, {**messages[1][1], "text": " "}), *messages[2:]],
-    }.items():
-        corpus.recording(f"{name}_{what}", bag_of(scratch, kept), "mcap", devices)
+    kept = [messages[first - 1 :], messages[:first], [], messages[: first - 1] + messages[first:], messages[1:]]
+    kept.append([(kind, {**row, "has_raw": False}) for kind, row in messages[first:] if kind == CONTACT_TYPE])
+    kept.append([messages[0], (LINE_TYPE, {**messages[1][1], "text": " "}), *messages[2:]])
+    for number, each in enumerate(kept):
+        corpus.recording(f"{name}_kept_{number}", bag_of(scratch, each), "mcap", devices)
 
 
 def bag_cases(corpus, name, content, devices, chances):

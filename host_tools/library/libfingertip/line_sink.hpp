@@ -14,6 +14,8 @@ public:
 
   /* Without its end. Throws Error if the disk is full, or the file cannot hold it. */
   virtual void line(const std::string &text) = 0;
+  /* Of an MCAP file, before the first line: wrench, location and pressures of each row. */
+  virtual void repeat_every_row() {}
   /* A last one that has no end. */
   virtual void torn_line(const std::string &text) = 0;
   /* Last of all. */

@@ -134,10 +134,6 @@ McapLineSink::McapLineSink(std::unique_ptr<ByteSink> file)
     : file_(std::move(file)),
       writer_([this](const std::string &bytes) { file_->append(bytes.data(), bytes.size()); }, "ros2", "fingertip") {}
 
-void McapLineSink::line(const std::string &text) { take(text, false); }
-
-void McapLineSink::torn_line(const std::string &text) { take(text, true); }
-
 void McapLineSink::take(const std::string &text, bool torn) {
   if (!in_head_) {
     put(text, torn);
@@ -323,7 +319,7 @@ bool McapLineSink::put_row(const std::string &text) {
   Device &device = devices_[row.device];
   const ros::Header header = {clock_.now_ns(), device.frame_id};
   add(device.contact, ros::encode(header, row));
-  const bool is_repeated = std::exchange(device.period, last_ns_ / PERIOD_ns) != last_ns_ / PERIOD_ns;
+  const bool is_repeated = std::exchange(device.period, last_ns_ / PERIOD_ns) != last_ns_ / PERIOD_ns || repeats_every_row_;
   if (is_repeated && row.contact) {
     add(device.wrench, ros::wrench(header, row.contact->body.contact));
     add(device.place, ros::place(header, row.contact->body.contact));

@@ -40,8 +40,9 @@ public:
   explicit McapLineSink(std::unique_ptr<ByteSink> file);
 
   /* Throws Error also for a line that is no text, which no message can hold. */
-  void line(const std::string &text) override;
-  void torn_line(const std::string &text) override;
+  void line(const std::string &text) override { take(text, false); }
+  void torn_line(const std::string &text) override { take(text, true); }
+  void repeat_every_row() override { repeats_every_row_ = true; }
   void finish() override;
   const std::string &path() const override { return file_->path(); }
   std::string unread_rows() const override;
@@ -69,6 +70,7 @@ private:
 
   std::unique_ptr<ByteSink> file_;
   mcap::Writer writer_;
+  bool repeats_every_row_ = false;
   bool in_head_ = true; /* until the header line */
   std::vector<std::pair<std::string, bool>> head_;
   std::uint64_t number_ = 0;

@@ -110,6 +110,9 @@ class TestMcap(unittest.TestCase):
         rows = [line.split(",")[0] for line in self.several_csv.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
         found = [topic for topic, *_ in bags.by_rosbags(bag)]
         self.assertEqual([found.count(f"/fingertip/{name}/contact") for name in ("AAAA", "BBBB")], [rows.count("0"), rows.count("1")])
+        every = [topic for topic, *_ in bags.by_rosbags(self.convert(self.csv, "every.mcap", "--every-row"))]
+        self.assertEqual(*(sum(topic.endswith(kind) for topic in every) for kind in ("/wrench", "/place")))
+        self.assertGreater(sum(topic.endswith("/wrench") for topic in every), 0.8 * sum(topic.endswith("/contact") for topic in every))
 
     def test_the_points_of_a_camera_are_no_sensors(self):
         bag = self.folder / "camera.mcap"

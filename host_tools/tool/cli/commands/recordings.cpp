@@ -30,6 +30,7 @@ struct Conversion {
   std::string device; /* of several in the file; empty: all, or the only one */
   bool salvage = false;
   bool overwrite = false;
+  bool every_row = false; /* in all kinds of messages of an MCAP file */
   TimeSpan interval;
 };
 
@@ -128,16 +129,14 @@ void report_cut_short(const std::string &path, bool is_cut_short) {
 
 /* On standard error: damaged lines, a missing end. */
 void report_losses(const std::string &path, const PacketFile &file) {
-  std::string name = printable(path);
   if (file.skipped_lines() > 0) {
-    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", name.c_str(), static_cast<Count>(file.skipped_lines()));
+    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", printable(path).c_str(), static_cast<Count>(file.skipped_lines()));
   }
   report_cut_short(path, file.is_cut_short());
 }
 
 /* To a recording of one fingertip, packet by packet, with counts of its own in the end line. Throws Error. */
 void convert_packets(const Conversion &conversion) {
-  check_paths(conversion);
   Contents contents = contents_of(conversion);
   Metadata metadata = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"source", conversion.from}};
   for (const auto &[key, value] : contents.recorder) {
@@ -172,10 +171,12 @@ void convert_packets(const Conversion &conversion) {
 
 /* To a recording, line by line: nothing is lost, nothing changed. Throws Error. */
 void convert_lines(const Conversion &conversion) {
-  check_paths(conversion);
   RecordingReader(conversion.from, true); /* throws for what is none */
   auto source = within(open_lines(conversion.from), conversion.interval);
   auto sink = make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished);
+  if (conversion.every_row) {
+    sink->repeat_every_row();
+  }
   LineSource::Line line;
   Progress progress(conversion.from);
   std::uint64_t last = 0, count = 0, rows = 0; /* and the header */
@@ -226,7 +227,6 @@ void convert_lines(const Conversion &conversion) {
 
 /* To the bytes of the line. */
 void convert_to_capture(const Conversion &conversion) {
-  check_paths(conversion);
   contents_of(conversion); /* throws before anything is written */
   OutputFile capture(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished);
   PacketFile file(conversion.from, conversion.salvage, conversion.device, conversion.interval);
@@ -249,6 +249,7 @@ int convert(const Conversion &conversion) {
   if (!to_capture && end != ".csv" && !is_mcap_name(conversion.to)) {
     throw WrongUsage("\"" + printable(conversion.to) + "\" must end with .csv, .mcap or .ftr, which selects the format");
   }
+  check_paths(conversion);
   if (to_capture) {
     convert_to_capture(conversion);
   } else if (conversion.device.empty() && is_recording(conversion.from, *open_bytes(conversion.from))) {
@@ -349,6 +350,8 @@ void add_convert(CommandLine &line) {
   with_value(command, "SERIAL", "--device", options->device, "Serial number of one of several fingertips in the recording; only this one");
   command->add_flag("--salvage", options->salvage, "Read what is readable of a damaged file, and report the rest");
   command->add_flag("--overwrite", options->overwrite, "Replace OUT if it exists");
+  command->add_flag("--every-row", options->every_row,
+                    "Into OUT.mcap: repeat each row as wrench, location and pressures, not 100 a second");
   with_time_span(command, options->interval);
 }
 
