@@ -29,8 +29,8 @@ constexpr std::uint32_t FORCE_ONLY =
 // A place with one of these flags is not trusted. UNCERTAIN is: a tangential force may have moved the place, which is what shows that
 // force.
 constexpr std::uint32_t NO_PLACE = FORCE_ONLY & ~std::uint32_t{CONTACT_FLAG_UNCERTAIN};
-// A tangential force as large as the normal one moves the Gaussian by this many sigmas at least, whatever the shape, but by
-// no more than 3.75 to 5 mm on 12 mm of rubber, however wide the contact is (unit.cell.face).
+// A tangential force as large as the normal one moves the Gaussian by about this many sigmas or more, whatever the shape,
+// but a wide one by 3.4 to 7 mm however large its sigma is, on 12 mm of rubber (unit.cell.face).
 constexpr double PULLED = 0.5, PULLED_mm = 3.75;
 constexpr double PULLS_s = 0.025; // one frame alone shows no pull
 constexpr std::uint32_t OVER = CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND;

@@ -396,7 +396,6 @@ private:
   KindOutcome outcome() {
     outcome_.step_us = stepping_us_ / std::max(steps_, 1.0);
     outcome_.slides = report_.slides;
-    outcome_.friction = report_.friction / (0.5 * inputs().friction_share * (grasp_.pads[0].friction + grasp_.pads[1].friction));
     outcome_.slid_mm = cell_.slid_mm();
     outcome_.crushed = outcome_.peak_N > grasp_.crushes_N;
     outcome_.catches = slips_.slips;

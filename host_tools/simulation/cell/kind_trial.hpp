@@ -87,7 +87,6 @@ struct KindOutcome {
   double turned_deg = 0.0;   // about the grip's axis, the most since the lift
   double margin = 0.0;       // median of force over least force, from the lift's end on
   std::uint32_t slides = 0;  // that the controller counted
-  double friction = 0.0;     // that it used in the end, over the true one
   std::vector<Slip> catches; // slides that ended before the object was lost
   // Only of a still trial.
   std::optional<double> settle_s; // from the touch until the force stays within 10 % for 0.5 s
