@@ -394,9 +394,8 @@ def message_cases(corpus, name, bag, devices):
     nan, inf = float("nan"), float("inf")
     row = messages[at][1]
     pressures = list(row["pressure_pa"])
-    add("written_by_another")
-    add("not_packed", compression=mcap.writer.CompressionType.NONE)
-    add("packed_by_lz4", compression=mcap.writer.CompressionType.LZ4)
+    for compression in mcap.writer.CompressionType:
+        add(f"packed_by_{compression.name}", compression=compression)
     add("no_chunks", use_chunking=False)
     add("no_crc", enable_crcs=False)
     add("no_index", index_types=mcap.writer.IndexType.NONE, use_statistics=False, use_summary_offsets=False)

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 
-from nightly import PATIENCE_s, REPORT, Programs, job, run
+from nightly import PATIENCE_s, REPORT, Programs, job, run, wait_for
 
 from fingertip import Fingertip
 from fingertip.files import InputError, read_recording
@@ -62,13 +62,16 @@ def python(build):
     ("rows_lost_silently", "<=", 0),
 )
 def recordings(build):
-    """Processor time of read_recording for a row of a minute at the highest rate, the better of three readings of each kind; the size of an hour;
-    and what the test formats counted."""
+    """Processor time of read_recording for a row of a minute of `fingertip simulate`, the better of three readings of each kind; the size of an hour at
+    the highest rate, with that noise; and what the test formats counted."""
     with Programs(build) as programs:
-        files, found = [programs.folder / f"minute.{end}" for end in ("csv", "mcap")], {}
-        port = programs.fake_device("AAAA", f"rate={RATE_Hz}")
-        run(build / "host_tools/tool/cli/fingertip", "record", files[0], "--port", port, "--seconds", SECONDS)
-        run(build / "host_tools/tool/cli/fingertip", "convert", *files)
+        tool, files, found = build / "host_tools/tool/cli/fingertip", [programs.folder / f"minute.{end}" for end in ("csv", "mcap")], {}
+        log = programs.folder / "log"
+        programs.start(tool, "simulate", stdout=programs.enter_context(open(log, "wb")))
+        wait_for(lambda: b"ready:" in log.read_bytes(), "simulated fingertip")
+        run(tool, "set", "osr=256", "rate=max")
+        run(tool, "record", files[0], "--seconds", SECONDS)
+        run(tool, "convert", *files)
         for file in files:
             times_s = []
             for _ in range(3):
@@ -76,7 +79,7 @@ def recordings(build):
                 rows = len(read_recording(file)["t_us"])
                 times_s.append(time.process_time() - begun_s)
             found[f"python_{file.suffix[1:]}_us_per_row"] = round(min(times_s) / rows * 1e6, 2)
-        found["hour_mcap_GB"] = round(files[1].stat().st_size * 3600 / SECONDS / 1e9, 2)
+        found["hour_mcap_GB"] = round(files[1].stat().st_size / rows * RATE_Hz * 3600 / 1e9, 2)
     formats = json.loads((REPORT / "formats.json").read_text(encoding="utf-8")) if (REPORT / "formats.json").exists() else {}
     found |= {name: formats.get(name) for name in ("recordings_refused_wrongly", "rows_lost_silently")}
     return found | {"python_mcap_us_per_row_over_csv": round(found["python_mcap_us_per_row"] / found["python_csv_us_per_row"], 2)}
