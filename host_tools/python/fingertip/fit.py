@@ -151,8 +151,8 @@ def _gates_Pa(noise_Pa: float) -> tuple[float, float]:
 
 
 def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noise_Pa: float, follow: bool = False) -> FloatArray:
-    """Pa above the zero [row, sensor]; follow: rows follow each other in time. Raises InputError where they cannot be those of touches on the pad,
-    warns of what makes that unlikely."""
+    """Pa above the zero [row, sensor]; follow: rows follow each other in time. Raises InputError where they cannot be those of touches on the
+    pad, warns of what makes that unlikely."""
     if unit not in UNITS:
         raise InputError(f"{printable(unit)} is no unit; give one of {', '.join(UNITS)}")
     table = UNITS[unit] * np.asarray(pressures, float)
@@ -387,7 +387,7 @@ def calibrate(
     zero_rows: int = 0,
     noise_Pa: float = NOISE_Pa,
 ) -> dict[str, Any]:
-    """What the tool's calibration finds of rows in which one weight, of force_N if it is known, stands at different places: at most 40 of them, from
+    """What the tool's calibration finds of rows of one weight, of force_N if it is known, at different places: at most 40 of them, from
     all over the file. As fit() takes it. Raises InputError where they do not determine the gains."""
     of_pad = read_pad(pad)
     reading_Pa = _readings(pressures, of_pad, unit, zero_rows, noise_Pa)
@@ -401,8 +401,8 @@ def calibrate(
 
 
 def read_numbers(path: str) -> tuple[list[str], FloatArray]:
-    """(cells of the last line before the first row of numbers, rows) of a text file with comma, semicolon, tab or blanks between cells. Raises
-    InputError, which names the line."""
+    """(cells of the last line before the first row of numbers, rows) of a text file with comma, semicolon, tab or blanks between cells.
+    Raises InputError, which names the line."""
     rows: list[list[float]] = []
     head: list[str] = []
     count = 0
@@ -431,8 +431,8 @@ def read_numbers(path: str) -> tuple[list[str], FloatArray]:
 
 
 def read_table(path: str, sensors: int, first: int | None = None, time: int | None = None) -> tuple[FloatArray, FloatArray | None]:
-    """(pressures [row, sensor], time [row] or None) of such a file. first, time: columns counted from 1. Raises InputError, and warns of columns that
-    look like others."""
+    """(pressures [row, sensor], time [row] or None) of such a file. first, time: columns counted from 1. Raises InputError, and warns of
+    columns that look like others."""
     head, table = read_numbers(path)
     count = table.shape[1]
     begin = count - sensors if first is None else first - 1

@@ -58,7 +58,7 @@ def gaps_as_nan(t_s, values, fitted):
 
 
 def thinned(recording, rows):
-    """Of many rows those with the least and the largest force of each bin, and where a state begins and ends: a picture has no room for more."""
+    """Of many rows those with the least and the largest force of each bin, and where a state changes: a picture has no room for more."""
     step = len(rows) // POINTS
     if step < 2:
         return rows
@@ -391,7 +391,7 @@ def main(argv):
     rows = np.flatnonzero(recording.has_contact)
     rows = rows if comparison else thinned(recording, rows)
     if not len(rows):
-        raise InputError(f"{options.recording}: no contact packet in it; record with the contact stream on")
+        raise InputError(f"{options.recording}: no contact packet in it, or in this part of it; record with the contact stream on")
     t_s, restarts_s = (comparison.t_s, ()) if comparison else continuous_time_s(recording, rows)
     x, y, force = (recording[name][rows] for name in ("x_mm", "y_mm", "force_N"))
     fitted, slip = recording.flag(FIT_VALID)[rows], recording.flag(SLIP)[rows]
