@@ -160,9 +160,9 @@ class Contacts(Measure):
         saturated = ((readings_Pa > self.max_pressure_Pa - AMBIENT_Pa) << np.arange(SENSORS)).sum(axis=2).astype(np.uint32)
         settings, own = self.settings_of(pads, noise_Pa), self.own_of(pads)
         fits, estimates = self.tangential(self.own_array, profile, settings, q10(readings_Pa), usable, saturated, own=own)
-        published, exact = self.made("published", len(base_Pa)), profile.copy()
+        exact = profile.view(f"V{profile.itemsize}").copy().view(profile.dtype)  # with the pad's ends, which are no fields of the record
         exact["tangential_scale_sd"] = 0.0
-        last = (np.ascontiguousarray(each[:, -1]) for each in (fits, estimates))
+        published, last = self.made("published", len(base_Pa)), (np.ascontiguousarray(each[:, -1]) for each in (fits, estimates))
         self.call("publish", exact, np.ascontiguousarray(pads["force_scale"]), 0.0, *last, published)
         found = (fits["flags"] & FIT_VALID > 0).all(axis=1)
         published[~found] = 0
