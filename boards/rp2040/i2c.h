@@ -44,10 +44,6 @@ enum ft_status i2c_start_read(uint8_t address, uint8_t byte_count);
 enum ft_status i2c_poll(uint8_t bytes[I2C_MAX_READ_BYTES]);
 #define I2C_IDLE_us 5u
 
-/* Time on the bus of the two kinds of transaction at 400 kHz: 9 clocks a byte, 1 for START and for STOP. */
-#define I2C_WRITE_us 50u
-#define I2C_READ_us(byte_count) ((11u * 5u + 9u * 5u * (byte_count) + 1u) / 2u)
-
 /* After i2c_close_to_lines(). */
 enum i2c_line { I2C_LINE_SDA, I2C_LINE_SCL };
 void i2c_line_pull_low(const struct i2c_pins *pins, enum i2c_line line);

@@ -33,11 +33,6 @@ static _Noreturn void run(void) {
   }
 }
 
-static void drain(void) {
-  while (SIO_FIFO_ST & SIO_FIFO_ST_VALID)
-    (void)SIO_FIFO_RD;
-}
-
 static bool wait_for(uint32_t bits) {
   int polls = 0;
   while (!(SIO_FIFO_ST & bits) && polls < POLLS)
@@ -47,7 +42,8 @@ static bool wait_for(uint32_t bits) {
 
 static bool is_echoed(uint32_t word) {
   if (word == 0) {
-    drain();
+    while (SIO_FIFO_ST & SIO_FIFO_ST_VALID)
+      (void)SIO_FIFO_RD;
     send_event(); /* it may wait for room */
   }
   if (!wait_for(SIO_FIFO_ST_READY))

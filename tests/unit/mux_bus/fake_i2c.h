@@ -50,3 +50,7 @@ uint64_t fake_i2c_next_event_us(void);
 
 /* The interrupt of that end. */
 void fake_i2c_interrupt(void);
+
+/* Time on the bus of the two kinds of transaction at 400 kHz: 9 clocks a byte, 1 for START and for STOP. */
+#define I2C_WRITE_us 50u
+#define I2C_READ_us(byte_count) ((11u * 5u + 9u * 5u * (byte_count) + 1u) / 2u)
