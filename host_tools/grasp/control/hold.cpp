@@ -152,8 +152,8 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
     const double share = rests ? 1.0 - std::exp(-settings.decay_1_s * passed_s) : 0.0;
     wanted_N_ -= share * std::max(wanted_N_ - need, 0.0);
   }
-  // By the place alone nothing opens the gripper, so what was wanted before does not count.
-  const bool by_place = readings.has_place && !readings.has_load && !has_seen_load_;
+  // By the place alone nothing opens the gripper, so what was wanted before does not count, unless the object slides on.
+  const bool by_place = readings.has_place && !readings.has_load && !has_seen_load_ && !goes_on_;
   wanted_N_ = by_place ? need : std::max(wanted_N_, need);
   return wanted_N_;
 }
