@@ -146,6 +146,6 @@ void tangential_stage_use_profile(struct tangential_stage *own, const struct pad
 void tangential_stage_use_scale(struct tangential_stage *own, const struct location_stage *location,
                                 const struct contact_settings *contact) {
   if (own->profile) {
-    tangential_use(&own->settings, own->profile, contact, location->calibration != NULL);
+    tangential_use(&own->settings, own->profile, contact, location->calibration != NULL, location->off_mm);
   }
 }

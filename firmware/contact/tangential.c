@@ -7,8 +7,13 @@
 #include <math.h>
 #include <string.h>
 
+/* No residual shows what moves all sensors that a contact presses, some four: their places, and the ends of a pad (report truth, over
+ * time). */
+#define PLACES_SHARE 0.5f
+#define ENDS_mm 0.07f
+
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile, const struct contact_settings *settings,
-                    bool calibrated) {
+                    bool calibrated, float off_mm) {
   /* A calibration's scale was found with 2 pi p0 sigma^2, of which the estimate's force is no
    * part; without one the estimate is the force itself, and as uncertain. */
   const float ratio = calibrated ? profile->force_ratio : 1.0f;
@@ -17,6 +22,9 @@ void tangential_use(struct tangential_settings *tangential, const struct pad_pro
   tangential->tangential_scale = profile->tangential_scale;
   tangential->tangential_scale_sd = profile->tangential_scale_sd;
   tangential->from_touch = profile->from_touch != 0;
+  const bool ends_near = profile->overhang_mm > 0.0f && profile->overhang_mm < profile->thickness_mm;
+  const float of_places_mm = PLACES_SHARE * off_mm, of_ends_mm = ends_near ? ENDS_mm : 0.0f;
+  tangential->place_square_q26 = fit_fixed(of_places_mm * of_places_mm + of_ends_mm * of_ends_mm, 26);
   float edges[PAD_EDGE_KINDS][PAD_EDGE_TERMS];
   memcpy(edges, &profile->edges, sizeof edges);
   for (int kind = 0; kind < PAD_EDGE_KINDS; kind++) {
@@ -168,13 +176,10 @@ static int32_t pulled_q14(int32_t ratio_x_q26, int32_t ratio_y_q26, int32_t sd_q
   return scaled_to_fixed(quotient_of(odds, sum_of(one, odds)), 14);
 }
 
-/* 0.05 mm, squared: what sensors' places and pads' ends move a location by. No residual shows it. */
-#define PLACE_SQUARE_Q26 167772
-
 /* The place is the mean of that of a contact that is pulled as estimated and of one that is not,
  * each by how likely it is. The standard deviation has what lies between the two. What it loses where nothing pulls is
  * of the same misfit as the place's: else what is left would be mostly the difference of the two factors. */
-static void weigh_force(struct fit_tangential *found) {
+static void weigh_force(const struct tangential_settings *settings, struct fit_tangential *found) {
   int32_t force_N_q24 = fit_fixed(found->force_N, 24);
   force_N_q24 = force_N_q24 < FORCE_MIN_N_Q24 ? FORCE_MIN_N_Q24 : force_N_q24;
   const int32_t ratio_x_q26 = per_force_q26(found->qx_N, force_N_q24);
@@ -197,8 +202,7 @@ static void weigh_force(struct fit_tangential *found) {
   const struct scaled between = scaled_mul(squares_of(dx_q20, dy_q20, 20), other);
   variance = sum_of(variance, scaled_mul(sum_of(between, of_force), share));
   const bool small = sum_of(variance, (struct scaled){-sixteenth.mantissa, sixteenth.exponent}).mantissa < 0;
-  const struct scaled still = {PLACE_SQUARE_Q26 >> 4, 4 - 26};
-  const struct scaled root = scaled_sqrt(sum_of(small ? sixteenth : variance, still));
+  const struct scaled root = scaled_sqrt(sum_of(small ? sixteenth : variance, scaled_from(settings->place_square_q26, -26)));
   found->location_sd_mm = fit_float(root.mantissa, root.exponent);
 }
 
@@ -231,7 +235,7 @@ void tangential_update(struct tangential_history *history, const struct tangenti
       !without_edges(settings, input->tangential, &mended)) {
     return;
   }
-  weigh_force(&mended);
+  weigh_force(settings, &mended);
   float qx_N = found->qx_N, qy_N = found->qy_N;
   if (settings->from_touch) {
     if (!settle_zero(history, input->t_us, qx_N / found->force_N, qy_N / found->force_N)) {
@@ -254,7 +258,7 @@ void tangential_update(struct tangential_history *history, const struct tangenti
   force->q_sd_N = fit_quadrature(scale, found->q_sd_N, scale_sd, size_N);
   force->ratio = settings->tangential_scale * size_N / found->force_N;
   result->flags |= CONTACT_FLAG_TANGENTIAL_VALID;
-  result->flags &= ~(uint32_t)(CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_ELONGATED);
+  result->flags &= ~(uint32_t)(CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_ELONGATED | CONTACT_FLAG_MODEL);
   result->flags |= found->elongated ? (uint32_t)CONTACT_FLAG_ELONGATED : 0;
   if (force->location_sd_mm > settings->location_sd_limit_mm) {
     result->flags |= CONTACT_FLAG_UNCERTAIN;

@@ -14,13 +14,17 @@ struct tangential_settings {
   float tangential_scale; /* tangential force is this and force_scale times the estimate's */
   float tangential_scale_sd;
   bool from_touch;
+  int32_t place_square_q26;                          /* mm^2, variance that no residual shows, of sensors' places and of ends */
   int32_t edges_q20[PAD_EDGE_KINDS][PAD_EDGE_TERMS]; /* of the profile, in the order there */
   float location_sd_limit_mm;                        /* UNCERTAIN above it */
 };
 
-/* The scales of this profile, with the calibration whose scales are in settings or, if it is not calibrated, without one. */
+/* The scales of this profile, with the calibration whose scales are in settings or, if it is not calibrated, without one. off_mm: how far
+ * sensors are off their places, root mean square, 0..10. */
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile, const struct contact_settings *settings,
-                    bool calibrated);
+                    bool calibrated, float off_mm);
+/* Of pads that are not calibrated: those of others are off by 0.1 to 0.23 mm each way (real arrays on boards). */
+#define TANGENTIAL_OFF_mm 0.14f
 
 /* The tangential force at the beginning of a contact counts as zero: the mean of Q / F over this time after its
  * first estimate. Long enough for the mean of a hundred frames, short before any lift. */

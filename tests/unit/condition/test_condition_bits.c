@@ -96,8 +96,8 @@ static uint32_t course(void) {
 }
 
 TEST(test_frames_are_conditioned_the_same_to_the_bit) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x4F7FB0D4, 0x5D76E990, 0x0CDBEAC0, 0x94F32408,
-                                                 0x4F14CA54, 0xB9C478F6, 0xC212D584, 0x6DED93A4};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x8AF92143, 0x650B7EDE, 0xE991371A, 0xA895B2CC,
+                                                 0xE4DCDE68, 0x464060BF, 0x547A2ECB, 0x6AC72E30};
   uint32_t found[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x7A65726F));
   for (int i = 0; i < COURSES; i++) {

@@ -12,7 +12,8 @@ static struct contact_result result;
 static struct tangential_force load;
 
 void setUp(void) {
-  settings = (struct tangential_settings){.force_scale = 1.0f, .tangential_scale = 1.0f, .location_sd_limit_mm = 0.6f};
+  settings =
+      (struct tangential_settings){.force_scale = 1.0f, .tangential_scale = 1.0f, .place_square_q26 = 167772, .location_sd_limit_mm = 0.6f};
   tangential_reset(&history);
   found = (struct fit_tangential){.valid = true,
                                   .x_mm = 2.5f,
@@ -159,7 +160,7 @@ static void use_edges(const struct pad_edges *edges) {
   pad.edges = *edges;
   pad.tangential_scale = 1.0f;
   pad.tangential_scale_sd = 0.0f;
-  tangential_use(&settings, &pad, &(struct contact_settings){.force_scale = 1.0f}, false);
+  tangential_use(&settings, &pad, &(struct contact_settings){.force_scale = 1.0f}, false, TANGENTIAL_OFF_mm);
 }
 
 /* At u = 0.25, v = -0.75: u^2 = 0.0625, v^2 = 0.5625. */
@@ -218,7 +219,7 @@ TEST(a_calibration_scales_what_its_force_scale_was_found_with) {
   pad.tangential_scale = 1.5f;
   pad.from_touch = 1;
   const struct contact_settings scales = {.force_scale = 1.25f, .force_scale_sd = 0.04f};
-  tangential_use(&settings, &pad, &scales, true);
+  tangential_use(&settings, &pad, &scales, true, TANGENTIAL_OFF_mm);
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, 1.25f * 0.9375f, settings.force_scale);
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.04f * 0.9375f, settings.force_scale_sd);
   TEST_ASSERT_EQUAL_FLOAT(1.5f, settings.tangential_scale);
@@ -226,14 +227,28 @@ TEST(a_calibration_scales_what_its_force_scale_was_found_with) {
   TEST_ASSERT_TRUE(settings.from_touch);
   TEST_ASSERT_EQUAL_FLOAT(0.6f, settings.location_sd_limit_mm);
   pad.from_touch = 0;
-  tangential_use(&settings, &pad, &scales, false);
+  tangential_use(&settings, &pad, &scales, false, TANGENTIAL_OFF_mm);
   TEST_ASSERT_EQUAL_FLOAT(1.0f, settings.force_scale);
   TEST_ASSERT_EQUAL_FLOAT(0.04f, settings.force_scale_sd);
   TEST_ASSERT_FALSE(settings.from_touch);
 }
 
-TEST(uncertain_speaks_of_the_corrected_location) {
-  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(CONTACT_FLAG_UNCERTAIN));
+static float place_sd_mm(float overhang_mm, float off_mm) {
+  struct pad_profile pad = pad_of_12_mm();
+  pad.overhang_mm = overhang_mm;
+  tangential_use(&settings, &pad, &(struct contact_settings){.force_scale = 1.0f}, true, off_mm);
+  return sqrtf((float)settings.place_square_q26 / 67108864.0f);
+}
+
+TEST(places_and_ends_are_in_the_sd_of_a_location) {
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, place_sd_mm(0.0f, 0.0f));
+  TEST_ASSERT_FLOAT_WITHIN(1e-4f, 0.05f, place_sd_mm(0.0f, 0.1f));
+  TEST_ASSERT_FLOAT_WITHIN(1e-4f, 0.05f, place_sd_mm(12.0f, 0.1f));
+  TEST_ASSERT_FLOAT_WITHIN(1e-4f, sqrtf(0.0025f + 0.0049f), place_sd_mm(9.0f, 0.1f));
+}
+
+TEST(warnings_speak_of_the_estimate) {
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL));
   found.elongated = true;
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_ELONGATED, update(0));
   found.elongated = false;
