@@ -13,16 +13,13 @@ static struct parallel_bus parallel_bus;
 static struct array_bus array_bus;
 static struct app app;
 
-static void on_event(void *context) {
-  (void)context;
-  app_on_event(&app);
-}
+static void on_event(void *context) { app_on_event(context); }
 
 int main(void) {
   if (pico_start() != FT_OK || parallel_bus_init(&parallel_bus, &array_bus) != FT_OK) {
     port_panic();
   }
-  port_set_event_handler(on_event, 0);
+  port_set_event_handler(on_event, &app);
   app_start(&app, &array_bus);
   for (;;) {
     app_run(&app);

@@ -18,7 +18,7 @@ import line_ros
 import line_settings
 import line_values
 import tomllib
-from line_names import MADE_BY, SETS
+from line_names import MADE_BY, SETS, hpp_head
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "n": 1}
@@ -396,20 +396,11 @@ def layouts_inc(line):
 def line_fields_hpp(line):
     contact, raw, info, health, ack, sync = (line.packets[name] for name in ("contact", "raw", "info", "health", "ack", "sync"))
     lines = [
-        f"/* {MADE_BY}.",
-        " *",
-        " * Walks over the fields of packets in the order of columns and comments of recordings, and the words",
-        " * for what packets number; no interface of the library. */",
-        "#pragma once",
-        "",
-        '#include "libfingertip/wire.hpp"',
-        "",
-        "#include <cstddef>",
-        "#include <cstdint>",
-        "#include <string>",
-        "",
-        "namespace fingertip::recording {",
-        "",
+        *hpp_head(
+            "Fields of packets in the order of recordings, and words. No interface.",
+            ("cstddef", "cstdint", "string"),
+            "fingertip::recording",
+        ),
         "/* A value of the packet that the file shows in another unit: shown = raw / scale. */",
         "template <typename Integer> struct Scaled {",
         "  Integer &raw;",
@@ -616,8 +607,8 @@ FILES = {
     "firmware/wire/bodies.h": bodies_h,
     "firmware/wire/layouts.inc": layouts_inc,
     "host_tools/library/libfingertip/line_fields.hpp": line_fields_hpp,
-    "host_tools/library/libfingertip/line_settings.hpp": lambda line: line_settings.line_settings_hpp(line, MADE_BY),
-    "host_tools/library/libfingertip/line_values.hpp": lambda line: line_values.line_values_hpp(line, MADE_BY),
+    "host_tools/library/libfingertip/line_settings.hpp": line_settings.line_settings_hpp,
+    "host_tools/library/libfingertip/line_values.hpp": line_values.line_values_hpp,
     "host_tools/python/fingertip/line.py": line_python.line_py,
     "host_tools/python/fingertip/msg/fingertip_msgs/msg/Contact.msg": line_ros.contact_msg,
     "host_tools/web/src/line/line_facts.ts": line_facts_ts,

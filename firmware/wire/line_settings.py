@@ -1,5 +1,7 @@
 """The settings of line.toml, as line.py writes them for C++, Python and the page."""
 
+from line_names import hpp_head
+
 
 class Value:
     """One field of a command that people set."""
@@ -50,20 +52,9 @@ class Setting:
 # ---- C++
 
 
-def line_settings_hpp(line, says):
+def line_settings_hpp(line):
     lines = [
-        f"/* {says}.",
-        " *",
-        " * The settings: how people type them, and where packets have them. For command.cpp alone. */",
-        "#pragma once",
-        "",
-        '#include "libfingertip/wire.hpp"',
-        "",
-        "#include <cstddef>",
-        "#include <cstdint>",
-        "",
-        "namespace fingertip {",
-        "",
+        *hpp_head("How people type the settings, and where packets have them. For command.cpp alone.", ("cstddef", "cstdint"), "fingertip"),
         "struct SettingValue {",
         "  double least, most; /* in a packet; that is `per` times what people type */",
         "  const unsigned *choices; /* no other; up to a 0; nullptr: all */",

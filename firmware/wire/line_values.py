@@ -2,6 +2,8 @@
 
 import dataclasses
 
+from line_names import hpp_head
+
 BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "text": 1}
 
 
@@ -56,20 +58,9 @@ def all_values(line):
     ]
 
 
-def line_values_hpp(line, says):
+def line_values_hpp(line):
     lines = [
-        f"/* {says}.",
-        " *",
-        " * Where wire_packet holds each field, for fingertip.cpp alone. */",
-        "#pragma once",
-        "",
-        '#include "libfingertip/wire.hpp"',
-        "",
-        "#include <cstddef>",
-        "#include <cstdint>",
-        "",
-        "namespace fingertip::values {",
-        "",
+        *hpp_head("Where wire_packet holds each field, for fingertip.cpp alone.", ("cstddef", "cstdint"), "fingertip::values"),
         "enum class Kind : std::uint8_t { u8, u16, i16, u32, i32, u64, f32, text };",
         "",
         "/* count numbers, stride bytes apart; a text is one. */",

@@ -10,6 +10,8 @@
 // A thread that runs for two minutes of real time, and a world in which everybody waits for ever, end it with a word on standard error.
 #include "support/time_keeper.hpp"
 
+#include "libfingertip/descriptor_transport.hpp"
+
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
@@ -23,10 +25,9 @@
 #include <sys/syscall.h>
 #include <sys/un.h>
 #include <sys/wait.h>
-#include <unistd.h>
-#include <utility>
 #include <vector>
 
+using fingertip::Descriptor;
 using fingertip::test::MOST_DESCRIPTORS;
 using fingertip::test::Order;
 using fingertip::test::Turn;
@@ -40,25 +41,6 @@ constexpr long MOST_TURNS = 5'000'000; // without time passing
   std::fprintf(stderr, "time_keeper: %s\n", what);
   std::exit(1);
 }
-
-class Descriptor {
-public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) {
-      close(fd_);
-    }
-  }
-  Descriptor(Descriptor &&other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Descriptor &operator=(Descriptor &&other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  int get() const { return fd_; }
-
-private:
-  int fd_;
-};
 
 // A process; of those that go on without a word nothing is known but that they have not ended.
 struct Process {

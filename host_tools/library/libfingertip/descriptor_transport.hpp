@@ -6,6 +6,8 @@
 #include <string>
 #include <sys/types.h>
 #include <sys/un.h>
+#include <unistd.h>
+#include <utility>
 
 namespace fingertip {
 
@@ -14,6 +16,22 @@ bool unix_address(const std::string &path, sockaddr_un *address);
 /* A connection to a Unix socket, or -1 and errno. own_name: of this end in the abstract namespace, which keeps out
  * others that give the same; "": none. */
 int connect_unix(const std::string &path, const std::string &own_name = "");
+
+/* A file descriptor that is closed at the end. */
+class Descriptor {
+public:
+  explicit Descriptor(int fd = -1) : fd_(fd) {}
+  ~Descriptor() { close(fd_); }
+  Descriptor(Descriptor &&other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  Descriptor &operator=(Descriptor &&other) noexcept {
+    std::swap(fd_, other.fd_);
+    return *this;
+  }
+  int get() const { return fd_; }
+
+private:
+  int fd_;
+};
 
 class DescriptorTransport : public Transport {
 public:

@@ -1,7 +1,6 @@
 /* written by firmware/wire/line.py from line.toml; change it there.
  *
- * Walks over the fields of packets in the order of columns and comments of recordings, and the words
- * for what packets number; no interface of the library. */
+ * Fields of packets in the order of recordings, and words. No interface. */
 #pragma once
 
 #include "libfingertip/wire.hpp"

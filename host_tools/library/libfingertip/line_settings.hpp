@@ -1,6 +1,6 @@
 /* written by firmware/wire/line.py from line.toml; change it there.
  *
- * The settings: how people type them, and where packets have them. For command.cpp alone. */
+ * How people type the settings, and where packets have them. For command.cpp alone. */
 #pragma once
 
 #include "libfingertip/wire.hpp"

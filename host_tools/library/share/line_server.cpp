@@ -1,6 +1,5 @@
 #include "library/share/line_server.hpp"
 
-#include "libfingertip/descriptor_transport.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/share_socket.hpp"
 
@@ -8,8 +7,6 @@
 #include <cstring>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <unistd.h>
-#include <utility>
 
 namespace fingertip {
 
@@ -28,16 +25,14 @@ LineServer::LineServer(const std::string &path, Clients clients) : path_(path), 
       throw Error(ErrorCode::port_in_use, path_ + ": another program listens there");
     }
     unlink(path_.c_str());
-    listening_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    listening_ = Descriptor(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     const mode_t mask = umask(0177);
-    listens = listening_ >= 0 && bind(listening_, reinterpret_cast<const sockaddr *>(&address), sizeof address) == 0 &&
-              listen(listening_, MOST_CLIENTS) == 0;
+    listens = bind(listening_.get(), reinterpret_cast<const sockaddr *>(&address), sizeof address) == 0 &&
+              listen(listening_.get(), MOST_CLIENTS) == 0;
     umask(mask);
   }
   if (!listens) {
-    const Error error(ErrorCode::cannot_write, path_ + ": " + std::strerror(errno));
-    close(listening_);
-    throw error;
+    throw Error(ErrorCode::cannot_write, path_ + ": " + std::strerror(errno));
   }
 }
 
@@ -45,12 +40,12 @@ LineServer::~LineServer() {
   for (const auto &client : clients_) {
     close(client.first);
   }
-  close(listening_);
   unlink(path_.c_str());
 }
 
 void LineServer::step() {
-  for (int client; clients_.size() < MOST_CLIENTS && (client = accept4(listening_, nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
+  for (int client;
+       clients_.size() < MOST_CLIENTS && (client = accept4(listening_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK)) >= 0;) {
     clients_[client];
   }
   for (auto client = clients_.begin(); client != clients_.end();) {

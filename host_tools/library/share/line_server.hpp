@@ -2,6 +2,8 @@
  * a line is dismissed. Lines that a client does not take in time are lost, each as a whole. */
 #pragma once
 
+#include "libfingertip/descriptor_transport.hpp"
+
 #include <functional>
 #include <map>
 #include <string>
@@ -33,7 +35,7 @@ private:
 
   std::string path_;
   Clients about_;
-  int listening_ = -1;
+  Descriptor listening_;
   std::map<int, std::string> clients_; /* by descriptor: what came of their next line */
 };
 

@@ -14,8 +14,6 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
-#include <unistd.h>
-#include <utility>
 
 namespace fingertip {
 
@@ -54,26 +52,6 @@ std::string peer_of(int fd) {
   std::getline(std::ifstream("/proc/" + pid + "/comm"), name);
   return "pid " + pid + (name.empty() ? "" : ", " + name);
 }
-
-/* A file descriptor that is closed at the end. */
-class Descriptor {
-public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) {
-      close(fd_);
-    }
-  }
-  Descriptor(Descriptor &&other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Descriptor &operator=(Descriptor &&other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  int get() const { return fd_; }
-
-private:
-  int fd_;
-};
 
 /* Sends as many as it takes now; nothing: it is gone. */
 std::optional<std::size_t> send_now(int fd, const std::uint8_t *bytes, std::size_t length) {

@@ -50,7 +50,6 @@ SLIP_SPEED_mm_s = 10.0
 
 TRUTH_COLUMNS = ("contact", "x_mm", "y_mm", "force_N", "p0_Pa", "sigma_mm", "slip")
 OPTIONAL_COLUMNS = ("Qx_N", "Qy_N", "temperature_degC")  # after the sensors, in any order
-RECORDING_COLUMNS = ("t_us", "frame", *CONTACT_COLUMNS, *LATER_COLUMNS, *RAW_COLUMNS)
 
 CONTACT, FIT_VALID, SLIP_VALID, SLIP = map(int, (Flag.CONTACT, Flag.FIT_VALID, Flag.SLIP_VALID, Flag.SLIP))
 TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH = int(Flag.TANGENTIAL_VALID), int(Flag.TANGENTIAL_FROM_TOUCH)

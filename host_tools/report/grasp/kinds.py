@@ -50,7 +50,7 @@ GOALS = tuple(
     ("one_bad_frame_squeezed", "<=", 0),
     ("lasting_bad_squeezed_percent", "<=", 2),
 )
-CONTROLLERS = ("ours", "fixed", "paper")
+CONTROLLERS = ("ours", "textbook", "fixed", "paper")
 MIXED = ("--kind", "usual,rough")
 # row: its options, whether it is judged; the others' controllers are beside it
 ROWS = {

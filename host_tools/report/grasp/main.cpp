@@ -6,6 +6,7 @@
 #include "libfingertip/random.hpp"
 #include "libfingertip/text.hpp"
 #include "report/grasp/fault_trials.hpp"
+#include "report/grasp/textbook.hpp"
 #include "simulation/cell/kind_trial.hpp"
 
 #include <CLI/CLI.hpp>
@@ -110,8 +111,9 @@ Done run_one(const Options &options, std::uint64_t n, const KindTrace &trace = {
   Done done{trial_of(options, n), {}, {}};
   done.settings = settings_with(options, done.trial);
   const GripperTraits &traits = done.trial.gripper.traits;
-  CoreController controller(done.settings, traits);
-  done.outcome = run_kind(done.trial, controller, trace);
+  CoreController ours(done.settings, traits);
+  Textbook textbook(traits);
+  done.outcome = run_kind(done.trial, options.controller == "textbook" ? static_cast<Controller &>(textbook) : ours, trace);
   return done;
 }
 
@@ -197,8 +199,8 @@ int run(int argc, char **argv) {
   Options options;
   app.add_option("--kind", options.kind, "gentle, usual, rough, slick, fragile; several, split by commas, by turns")->capture_default_str();
   app.add_option("--gripper", options.gripper, gripper_model_names() + " or ideal")->capture_default_str();
-  app.add_option("--controller", options.controller, "fixed: eq. (5) and (6) at 15 N; paper: at 6 N")
-      ->check(CLI::IsMember({"ours", "fixed", "paper"}))
+  app.add_option("--controller", options.controller, "textbook; fixed: 15 N; paper: eq. (5) and (6) at 6 N")
+      ->check(CLI::IsMember({"ours", "textbook", "fixed", "paper"}))
       ->capture_default_str();
   app.add_option("--set", options.settings, "Of our settings, split by commas: margin=1.4")->type_name("NAME=VALUE");
   app.add_option("--mass", options.mass_share, "Expected mass, of the true one")->check(CLI::NonNegativeNumber);

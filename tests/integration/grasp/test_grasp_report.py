@@ -81,12 +81,12 @@ class Grasp(unittest.TestCase):
         kinds = {(row["row"], row["gripper"], row["controller"]): row["grasps"] for row in found["kinds"]}
         for row, grasps in {
             ("usual and rough", "2f85", "paper"): 150,
-            ("slick", "ideal", "fixed"): 40,
+            ("slick", "ideal", "textbook"): 40,
             ("gentle", "2f85", "ours"): 40,
         }.items():
             self.assertEqual(kinds[row], grasps)
-        # Three grippers; three rows that are judged, each with three controllers, and nine others.
-        self.assertEqual(len(kinds), 3 * (3 * 3 + 9))
+        # Three grippers; three rows that are judged, each with four controllers, and nine others.
+        self.assertEqual(len(kinds), 3 * (3 * 4 + 9))
         self.assertTrue(found["simulated"])
         self.assertEqual([row["gripper"] for row in found["sets"]], 3 * ["2f85", "sts3215", "ideal"])
         self.assertEqual(

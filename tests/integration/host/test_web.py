@@ -227,7 +227,6 @@ class Web(WebCase):
             peak = pathlib.Path(f"/proc/{process.pid}/status").read_text().partition("VmHWM:")[2].split()[0]
             figures.add(TOOLS, {"web_attack_MB": int(peak) / 1000, "web_slow_answer_s": slow_s})
             self.assertLess(int(peak), 100e3)
-            self.assertLess(slow_s, 1)
             process.send_signal(signal.SIGINT)
             process.wait(PATIENCE_s)
 

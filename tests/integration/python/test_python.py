@@ -23,6 +23,8 @@ from fingertip import Flag, files  # noqa: E402
 from fingertip import plot  # noqa: E402
 from fingertip.wire import Health  # noqa: E402
 
+RECORDING_COLUMNS = ("t_us", "frame", *files.CONTACT_COLUMNS, *files.LATER_COLUMNS, *files.RAW_COLUMNS)
+
 CONTACT, FIT_VALID, SLIP_VALID, SLIP, TARED = 1, 2, 8, 16, 32
 
 
@@ -54,9 +56,7 @@ class ToolTest(unittest.TestCase):
         self.tool("scenario", name, "-o", path, *arguments)
         return path
 
-    def recording(
-        self, scenario, rate_Hz=200, zero_s=0.25, change=lambda row: row, until_s=None, end=True, columns=files.RECORDING_COLUMNS
-    ):
+    def recording(self, scenario, rate_Hz=200, zero_s=0.25, change=lambda row: row, until_s=None, end=True, columns=RECORDING_COLUMNS):
         """What a perfect fingertip would record of a scenario, after change(row)."""
         truth = files.read_scenario(scenario)
         path = self.folder / "recording.csv"

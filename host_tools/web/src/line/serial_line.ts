@@ -76,12 +76,8 @@ export class SerialLine implements Line {
       const reader = this.port.readable.getReader();
       this.reader = reader;
       try {
-        for (;;) {
-          const { value, done } = await reader.read();
-          if (done) {
-            break;
-          }
-          receive(value, performance.now());
+        for (let piece = await reader.read(); !piece.done; piece = await reader.read()) {
+          receive(piece.value, performance.now());
         }
       } catch (error) {
         why =

@@ -82,12 +82,8 @@ export class ServedFingertip implements Line {
     closed: (why: string) => void,
   ): Promise<void> {
     try {
-      for (;;) {
-        const { value, done } = await reader.read();
-        if (done) {
-          break;
-        }
-        receive(value, performance.now());
+      for (let piece = await reader.read(); !piece.done; piece = await reader.read()) {
+        receive(piece.value, performance.now());
       }
     } catch {
       // The server has ended, or close() was called.
