@@ -23,8 +23,7 @@ enum contact_flag {
   CONTACT_FLAG_LOW_SIGNAL = 1 << 8,
   CONTACT_FLAG_FLAT = 1 << 9, /* warning: there is pressure without a peak: no location */
   CONTACT_FLAG_UNCERTAIN = 1 << 10, /* warning: location_sd_mm is above the limit that is set */
-  /* warning: the residual is too large for one Gaussian, and no tangential force is estimated */
-  CONTACT_FLAG_MODEL = 1 << 11,
+  CONTACT_FLAG_MODEL = 1 << 11, /* warning: the residual is too large for one Gaussian */
   CONTACT_FLAG_SATURATED = 1 << 12, /* warning: a sensor is beyond its range and was left out */
   /* warning: too few sensors are in their range: the force is at least this */
   CONTACT_FLAG_FORCE_LOWER_BOUND = 1 << 13,

@@ -258,7 +258,7 @@ void tangential_update(struct tangential_history *history, const struct tangenti
   force->q_sd_N = fit_quadrature(scale, found->q_sd_N, scale_sd, size_N);
   force->ratio = settings->tangential_scale * size_N / found->force_N;
   result->flags |= CONTACT_FLAG_TANGENTIAL_VALID;
-  result->flags &= ~(uint32_t)(CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_ELONGATED | CONTACT_FLAG_MODEL);
+  result->flags &= ~(uint32_t)(CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_ELONGATED | (found->at_corner ? 0 : CONTACT_FLAG_MODEL));
   result->flags |= found->elongated ? (uint32_t)CONTACT_FLAG_ELONGATED : 0;
   if (force->location_sd_mm > settings->location_sd_limit_mm) {
     result->flags |= CONTACT_FLAG_UNCERTAIN;

@@ -287,8 +287,8 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
     return;
   }
   const struct scaled stated = scaled_mul(variance, pad->thin);
-  const bool outside = is_outside(pad, at->x_q26, COLUMNS) || is_outside(pad, at->y_q26, ROWS);
-  const int32_t least_q16 = outside ? MISFIT_LEAST_OUTSIDE_Q16 : MISFIT_LEAST_Q16;
+  const int outside = is_outside(pad, at->x_q26, COLUMNS) + is_outside(pad, at->y_q26, ROWS);
+  const int32_t least_q16 = outside > 0 ? MISFIT_LEAST_OUTSIDE_Q16 : MISFIT_LEAST_Q16;
   struct scaled pull_variance =
       scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PULL, least_q16, GAINS_SHIFT_PULL));
   pull_variance = fit_scaled_short(pull_variance);
@@ -324,6 +324,7 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   struct scaled moved = scaled_mul(length, amplitude);
   result->moved_q20_mm[0] = moved_q20(outcome, moved, 0, x_q8);
   result->moved_q20_mm[1] = moved_q20(outcome, moved, 1, y_q8);
+  result->at_corner = outside == 2;
   result->elongated = is_elongated(room, outcome, square, round, variance);
 }
 

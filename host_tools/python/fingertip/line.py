@@ -41,7 +41,7 @@ class Flag(enum.IntFlag):
     LOW_SIGNAL = 1 << 8  #: warning: the peak is below 20 standard deviations of the noise
     FLAT = 1 << 9  #: warning: there is pressure without a peak: no location
     UNCERTAIN = 1 << 10  #: warning: location_sd_mm is above the limit that is set
-    MODEL = 1 << 11  #: warning: the residual is too large for one Gaussian, and no tangential force is estimated
+    MODEL = 1 << 11  #: warning: the residual is too large for one Gaussian
     SATURATED = 1 << 12  #: warning: a sensor is beyond its range and was left out
     FORCE_LOWER_BOUND = 1 << 13  #: warning: too few sensors are in their range: the force is at least this
     SENSOR_MASKED = 1 << 14  #: warning: a sensor is missing or was left out

@@ -249,6 +249,8 @@ TEST(places_and_ends_are_in_the_sd_of_a_location) {
 
 TEST(warnings_speak_of_the_estimate) {
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID, update(CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_MODEL));
+  found.at_corner = true;
+  TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_MODEL, update(CONTACT_FLAG_MODEL));
   found.elongated = true;
   TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_ELONGATED, update(0));
   found.elongated = false;
