@@ -3,7 +3,6 @@
 #include "common/contact_flags.h"
 #include "config/defaults.h"
 #include "config/geometry.h"
-#include "contact/tangential.h"
 #include "port/port.h"
 
 #include <math.h>
@@ -119,17 +118,14 @@ static int32_t q15_pitches(int16_t length_um) {
 
 void location_stage_use_calibration(struct location_stage *own, const struct calibration *calibration) {
   own->calibration = calibration;
-  float square_um2 = 0.0f;
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     const struct sensor_calibration *sensor = calibration ? &calibration->sensors[k] : NULL;
     if (sensor) {
       own->own[k] = (struct fit_own){q15_pitches(sensor->off_x_um), q15_pitches(sensor->off_y_um), sensor->wider_q15};
-      square_um2 += (float)(sensor->off_x_um * sensor->off_x_um) + (float)(sensor->off_y_um * sensor->off_y_um);
     }
     own->settings.gain_sd_q16[k] = (uint16_t)((sensor ? sensor->gain_sd : DEFAULT_GAIN_SD) * 65536.0f + 0.5f);
   }
   own->settings.own = DEFAULT_USES_SHAPE && calibration ? own->own : NULL;
-  own->off_mm = own->settings.own ? 1e-3f * sqrtf(square_um2 / (float)geometry.sensor_count) : TANGENTIAL_OFF_mm;
   set_shape(own);
 }
 

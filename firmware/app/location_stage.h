@@ -16,7 +16,6 @@ struct location_stage {
   uint32_t failures;
   float prior_sigma_mm, prior_sd_mm;     /* set by the user: width to expect of a contact; sd 0: not set */
   const struct calibration *calibration; /* in use; NULL: none */
-  float off_mm;                          /* of the sensors from their places, root mean square */
   bool has_profile;                      /* a pad's profile is in use */
 };
 

@@ -1,6 +1,9 @@
 #include "app/tangential_stage.h"
 
 #include "common/contact_flags.h"
+#include "config/geometry.h"
+#include "fit/fit_fixed.h"
+#include "port/divide.h"
 #include "port/port.h"
 
 #include <string.h>
@@ -143,9 +146,18 @@ void tangential_stage_use_profile(struct tangential_stage *own, const struct pad
   tangential_reset(&own->history);
 }
 
+/* How far sensors are off their places: mean of |x| + |y|. */
+static int32_t off_um(const struct calibration *calibration) {
+  uint32_t sum_um = 0;
+  for (unsigned k = 0; k < geometry.sensor_count; k++) {
+    sum_um += fixed_size(calibration->sensors[k].off_x_um) + fixed_size(calibration->sensors[k].off_y_um);
+  }
+  return port_divide((int32_t)sum_um, geometry.sensor_count);
+}
+
 void tangential_stage_use_scale(struct tangential_stage *own, const struct location_stage *location,
                                 const struct contact_settings *contact) {
   if (own->profile) {
-    tangential_use(&own->settings, own->profile, contact, location->calibration != NULL, location->off_mm);
+    tangential_use(&own->settings, own->profile, contact, location->calibration ? off_um(location->calibration) : -1);
   }
 }

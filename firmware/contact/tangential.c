@@ -1,5 +1,6 @@
 #include "contact/tangential.h"
 
+#include "common/bytes.h"
 #include "common/contact_flags.h"
 #include "fit/fit_fixed.h"
 #include "fit/fit_math.h"
@@ -9,22 +10,23 @@
 
 /* No residual shows what moves all sensors that a contact presses, some four: their places, and the ends of a pad (report truth, over
  * time). */
-#define PLACES_SHARE 0.5f
-#define ENDS_mm 0.07f
+#define PLACES_Q26 13          /* (0.44 um)^2 in mm^2: half of the root of the mean square */
+#define USUAL_OFF_um 160       /* of others' arrays on boards: 0.1 to 0.23 mm each way */
+#define ENDS_SQUARE_Q26 328833 /* 0.07 mm */
 
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile, const struct contact_settings *settings,
-                    bool calibrated, float off_mm) {
+                    int32_t off_um) {
   /* A calibration's scale was found with 2 pi p0 sigma^2, of which the estimate's force is no
    * part; without one the estimate is the force itself, and as uncertain. */
+  const bool calibrated = off_um >= 0;
   const float ratio = calibrated ? profile->force_ratio : 1.0f;
   tangential->force_scale = calibrated ? settings->force_scale * ratio : 1.0f;
   tangential->force_scale_sd = settings->force_scale_sd * ratio;
   tangential->tangential_scale = profile->tangential_scale;
   tangential->tangential_scale_sd = profile->tangential_scale_sd;
   tangential->from_touch = profile->from_touch != 0;
-  const bool ends_near = profile->overhang_mm > 0.0f && profile->overhang_mm < profile->thickness_mm;
-  const float of_places_mm = PLACES_SHARE * off_mm, of_ends_mm = ends_near ? ENDS_mm : 0.0f;
-  tangential->place_square_q26 = fit_fixed(of_places_mm * of_places_mm + of_ends_mm * of_ends_mm, 26);
+  off_um = calibrated ? off_um : USUAL_OFF_um;
+  tangential->place_square_q26 = off_um * off_um * PLACES_Q26 + (bytes_from_f32(profile->overhang_mm) != 0 ? ENDS_SQUARE_Q26 : 0);
   float edges[PAD_EDGE_KINDS][PAD_EDGE_TERMS];
   memcpy(edges, &profile->edges, sizeof edges);
   for (int kind = 0; kind < PAD_EDGE_KINDS; kind++) {

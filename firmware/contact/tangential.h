@@ -19,12 +19,10 @@ struct tangential_settings {
   float location_sd_limit_mm;                        /* UNCERTAIN above it */
 };
 
-/* The scales of this profile, with the calibration whose scales are in settings or, if it is not calibrated, without one. off_mm: how far
- * sensors are off their places, root mean square, 0..10. */
+/* The scales of this profile, with the calibration whose scales are in settings. off_um: how far that has sensors off their places, mean of
+ * |x| + |y|, at most 4000; -1: not calibrated. */
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile, const struct contact_settings *settings,
-                    bool calibrated, float off_mm);
-/* Of pads that are not calibrated: those of others are off by 0.1 to 0.23 mm each way (real arrays on boards). */
-#define TANGENTIAL_OFF_mm 0.14f
+                    int32_t off_um);
 
 /* The tangential force at the beginning of a contact counts as zero: the mean of Q / F over this time after its
  * first estimate. Long enough for the mean of a hundred frames, short before any lift. */

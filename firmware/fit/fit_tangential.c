@@ -12,8 +12,7 @@
 #define ELONGATION_SD_mm2 4.0f
 
 /* Factors of the stated variances by chi^2. NUMERICS.md has their reasons ("What the firmware does not report"). */
-#define MISFIT_SHIFT_PULL 4           /* chi^2 / 8 of a tangential force: its degrees of freedom */
-#define MISFIT_SHIFT_PLACE 5          /* chi^2 / 32 of a location: by the coverage of calibrated pads */
+#define MISFIT_SHIFT 5                /* chi^2 / 32, by the coverage of calibrated pads */
 #define MISFIT_LEAST_Q16 1311         /* 0.02 */
 #define MISFIT_LEAST_OUTSIDE_Q16 4588 /* 0.07: there a contact's shape moves its place, and the readings hardly show it */
 /* Of the gains' part stays where chi^2 is small: of a tangential force half; of a location all, or nothing after a
@@ -209,7 +208,7 @@ NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_stat
 
 /* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
  * diagonal of the inverse matrix. with_pull_q8: the element of the row for this pull, or NULL. */
-static struct scaled variance_of(const struct fit_tangential_room *room, const struct outcome *outcome, int u, int pull,
+NOINLINE static struct scaled variance_of(const struct fit_tangential_room *room, const struct outcome *outcome, int u, int pull,
                                  int32_t *with_pull_q8) {
   const struct solution *solution = &outcome->solution;
   int32_t w_q8[UNKNOWNS]; /* row of the inverse of L, times 2^half */
@@ -254,13 +253,12 @@ static struct scaled root_of_product(struct scaled a, struct scaled b) { return 
 
 /* Whether it is within a quarter of a pitch of the outer sensors, or beyond. */
 static bool is_outside(const struct fit_pad *pad, int32_t at_q26, int32_t nodes) {
-  const int32_t quarter_q26 = pad->pitch_q26 >> 2;
-  return at_q26 > (4 * (nodes - 1 - nodes / 2) - 1) * quarter_q26 || at_q26 < (1 - 4 * (nodes / 2)) * quarter_q26;
+  const int32_t from_middle_q26 = at_q26 + (nodes % 2 ? 0 : pad->pitch_q26 >> 1);
+  return fixed_size(from_middle_q26) > (uint32_t)(2 * nodes - 3) * (uint32_t)(pad->pitch_q26 >> 2);
 }
 
 /* What the stated variance is to be multiplied by. */
-static struct scaled misfit_factor(const struct problem *problem, int32_t misfit_q16, int32_t least_q16, int gains_shift) {
-  misfit_q16 = misfit_q16 < least_q16 ? least_q16 : misfit_q16;
+static struct scaled misfit_factor(const struct problem *problem, int32_t misfit_q16, int gains_shift) {
   if (misfit_q16 < 1 << 16) {
     misfit_q16 += (((1 << 16) - misfit_q16) * problem->by_gains_q12) >> (12 + gains_shift);
   }
@@ -288,12 +286,12 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   }
   const struct scaled stated = scaled_mul(variance, pad->thin);
   const int outside = is_outside(pad, at->x_q26, COLUMNS) + is_outside(pad, at->y_q26, ROWS);
-  const int32_t least_q16 = outside > 0 ? MISFIT_LEAST_OUTSIDE_Q16 : MISFIT_LEAST_Q16;
-  struct scaled pull_variance =
-      scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PULL, least_q16, GAINS_SHIFT_PULL));
+  const int32_t least_q16 = outside > 0 ? MISFIT_LEAST_OUTSIDE_Q16 : MISFIT_LEAST_Q16, misfit_q16 = chi_square_q16 >> MISFIT_SHIFT;
+  const int32_t factor_q16 = misfit_q16 < least_q16 ? least_q16 : misfit_q16;
+  struct scaled pull_variance = scaled_mul(stated, misfit_factor(problem, factor_q16, GAINS_SHIFT_PULL));
   pull_variance = fit_scaled_short(pull_variance);
   const int gains_shift = problem->own ? GAINS_SHIFT_CALIBRATED : 0;
-  variance = scaled_mul(stated, misfit_factor(problem, chi_square_q16 >> MISFIT_SHIFT_PLACE, least_q16, gains_shift));
+  variance = scaled_mul(stated, misfit_factor(problem, factor_q16, gains_shift));
   variance = fit_scaled_short(variance);
   int32_t x_q8, y_q8;
   struct scaled pulls = scaled_add(variance_of(room, outcome, PULL_X, 0, NULL), variance_of(room, outcome, PULL_Y, 0, NULL));

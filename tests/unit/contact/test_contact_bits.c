@@ -49,7 +49,7 @@ static void draw_settings(void) {
   memset(&profile, 0, sizeof profile);
   profile.tangential_scale = between(0.5f, 2.0f);
   profile.tangential_scale_sd = between(0.0f, 0.2f);
-  tangential_use(&tangential_settings, &profile, &settings, ONE_IN(2), 0.1f);
+  tangential_use(&tangential_settings, &profile, &settings, ONE_IN(2) ? 113 : -1);
   for (int kind = 0; kind < PAD_EDGE_KINDS && ONE_IN(2); kind++) {
     for (int term = 0; term < PAD_EDGE_TERMS; term++) {
       tangential_settings.edges_q20[kind][term] = draw_between(-200000, 200000);
@@ -139,8 +139,8 @@ static uint32_t judge(uint32_t crc) {
 }
 
 TEST(test_contacts_are_judged_the_same_to_the_bit) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0xB9785A1F, 0xA729A1C4, 0x5EE90C76, 0xEEE9A006,
-                                                 0x8E235970, 0x31C4B2BA, 0x28672F18, 0x92196BCE};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x709FBFD5, 0x265C400F, 0xEA13C940, 0xC04971C8,
+                                                 0x023FA38B, 0xDD598F62, 0x7097B203, 0xE9931CDD};
   uint32_t crcs[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x736C6964));
   for (int i = 0; i < COURSES; i++) {

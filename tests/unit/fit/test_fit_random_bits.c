@@ -328,7 +328,7 @@ static void draw_pad(void) {
     profile.spread_mm2 = (float)any(0, 100);
     profile.spread_sd_mm2 = (float)exp(any(log(0.11), log(99)));
     profile.from_touch = (uint8_t)below(2);
-    tangential_use(&tip.scales, &profile, &(struct contact_settings){0.75f, 0, (float)any(0.1, 10), 1.0f}, below(2), (float)any(0, 10));
+    tangential_use(&tip.scales, &profile, &(struct contact_settings){0.75f, 0, (float)any(0.1, 10), 1.0f}, (int32_t)below(4002) - 1);
   } while (fit_pad_init(&tip.tangential.pad, tip.tangential.array, &profile) != FT_OK ||
            fit_shapes_init(&tip.shapes.pad, tip.tangential.array, &profile) != FT_OK);
   tip.rubber.profile = profile;
