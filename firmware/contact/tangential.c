@@ -198,7 +198,7 @@ static void weigh_force(const struct tangential_settings *settings, struct fit_t
   struct scaled variance = squares_of(fit_fixed(found->location_sd_mm, 20), 0, 20);
   const struct scaled sixteenth = {variance.mantissa, variance.exponent - 4};
   struct scaled of_force = scaled_mul(squares_of(moved[0], moved[1], 20), squares_of(sd_q26, 0, 26));
-  of_force = scaled_mul(of_force, squares_of(fit_fixed(found->place_per_pull, 20), 0, 20));
+  of_force = scaled_mul(of_force, scaled_from(fit_fixed(found->variance_per_pull, 20), -20));
   of_force.mantissa = -of_force.mantissa;
   const struct scaled share = {not_pulled, -14}, other = {pulled, -14};
   const struct scaled between = scaled_mul(squares_of(dx_q20, dy_q20, 20), other);

@@ -17,8 +17,6 @@
 #define MISFIT_LEAST_OUTSIDE_Q16 4588 /* 0.07: there a contact's shape moves its place, and the readings hardly show it */
 /* Of the gains' part stays where chi^2 is small: of a tangential force half; of a location all, or nothing after a
  * calibration, which leaves no errors that rise over the pad. */
-#define GAINS_SHIFT_PULL 1
-#define GAINS_SHIFT_CALIBRATED 12
 
 /* Thickness of a layer in units of length: the widest term's sd is 0.478 of the thickness. On layers thinner than
  * the pitch standard deviations grow as (pitch / thickness)^2 (NUMERICS.md). */
@@ -30,10 +28,6 @@
 #define LONG_MOST_NEAR_ENDS_Q15 8192
 #define NEAR_ENDS 0.75f
 
-/* A contact is elongated if its elongation exceeds this share of the widest term's variance with t,
- * and ELONGATED_SURE standard deviations: only where a pad ends near, as elsewhere LONG_MOST is no more. */
-#define ELONGATED_LEAST 0.07f
-#define ELONGATED_SURE 2.5f
 /* Larger where the pad ends near, which leaves residuals. */
 #define CHI_SQUARE_MAX 16
 #define CHI_SQUARE_MAX_NEAR_ENDS 60
@@ -206,28 +200,6 @@ NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_stat
   state->sum_q20 = sum_q20;
 }
 
-/* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
- * diagonal of the inverse matrix. with_pull_q8: the element of the row for this pull, or NULL. */
-NOINLINE static struct scaled variance_of(const struct fit_tangential_room *room, const struct outcome *outcome, int u, int pull,
-                                 int32_t *with_pull_q8) {
-  const struct solution *solution = &outcome->solution;
-  int32_t w_q8[UNKNOWNS]; /* row of the inverse of L, times 2^half */
-  int32_t sum_q11 = 0;
-  for (int k = u; k < UNKNOWNS; k++) {
-    int32_t w = k == u ? 1 << 8 : 0;
-    for (int m = u; m < k; m++) {
-      // cppcheck-suppress uninitvar ; m < k, and the rounds before have set those
-      w -= (room->matrix[k][m] * w_q8[m]) >> 14;
-    }
-    w_q8[k] = w = fixed_clamp(shifted(w, solution->half[k]), -INT16_MAX, INT16_MAX);
-    sum_q11 += (((w * w) >> 9) * (solution->inverse_q13[k] >> 6)) >> 3;
-  }
-  if (with_pull_q8) {
-    *with_pull_q8 = w_q8[pull];
-  }
-  return fit_scaled_from(sum_q11, 2 * outcome->column_q[u] - 30 - 11);
-}
-
 /* How far the place moves for a change of Q / F along the same axis, if the other unknowns follow:
  * from its row of the inverse of L, 2^half of it. length: with the amplitude. */
 static int32_t moved_q20(const struct outcome *outcome, struct scaled length, int axis, int32_t with_pull_q8) {
@@ -235,34 +207,12 @@ static int32_t moved_q20(const struct outcome *outcome, struct scaled length, in
   return shifted(with_pull_q8 * length.mantissa, q + length.exponent + 20);
 }
 
-static bool exceeds(struct scaled a, struct scaled b) { return scaled_sub(a, b).mantissa > 0; }
-
-/* square: e1^2 + e2^2; round: A v. variance: of a reading of weight 1. */
-static bool is_elongated(const struct fit_tangential_room *room, const struct outcome *outcome, struct scaled square, struct scaled round,
-                         struct scaled variance) {
-  const struct scaled least = {(int32_t)(ELONGATED_LEAST * ELONGATED_LEAST * 8388608.0f), -23};
-  if (!exceeds(square, scaled_mul(least, scaled_mul(round, round)))) {
-    return false;
-  }
-  const struct scaled sure = {(int32_t)(ELONGATED_SURE * ELONGATED_SURE * 2048.0f), -12};
-  struct scaled twice = scaled_add(variance_of(room, outcome, STRETCH, 0, NULL), variance_of(room, outcome, SLANT, 0, NULL));
-  return exceeds(square, scaled_mul(sure, scaled_mul(twice, variance)));
-}
-
 static struct scaled root_of_product(struct scaled a, struct scaled b) { return fit_scaled_sqrt(scaled_mul(a, b)); }
 
-/* Whether it is within a quarter of a pitch of the outer sensors, or beyond. */
-static bool is_outside(const struct fit_pad *pad, int32_t at_q26, int32_t nodes) {
+/* 1: it is within a quarter of a pitch of the outer sensors, or beyond; else 0. */
+FIXED_INLINE uint32_t is_outside(const struct fit_pad *pad, int32_t at_q26, int32_t nodes) {
   const int32_t from_middle_q26 = at_q26 + (nodes % 2 ? 0 : pad->pitch_q26 >> 1);
-  return fixed_size(from_middle_q26) > (uint32_t)(2 * nodes - 3) * (uint32_t)(pad->pitch_q26 >> 2);
-}
-
-/* What the stated variance is to be multiplied by. */
-static struct scaled misfit_factor(const struct problem *problem, int32_t misfit_q16, int gains_shift) {
-  if (misfit_q16 < 1 << 16) {
-    misfit_q16 += (((1 << 16) - misfit_q16) * problem->by_gains_q12) >> (12 + gains_shift);
-  }
-  return fit_scaled_from(misfit_q16, -16);
+  return ((uint32_t)(2 * nodes - 3) * (uint32_t)(pad->pitch_q26 >> 2) - fixed_size(from_middle_q26)) >> 31;
 }
 
 NOINLINE static void conclude(const struct problem *problem, const struct fit_tangential_unknowns *at, const struct outcome *outcome,
@@ -285,14 +235,12 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
     return;
   }
   const struct scaled stated = scaled_mul(variance, pad->thin);
-  const int outside = is_outside(pad, at->x_q26, COLUMNS) + is_outside(pad, at->y_q26, ROWS);
-  const int32_t least_q16 = outside > 0 ? MISFIT_LEAST_OUTSIDE_Q16 : MISFIT_LEAST_Q16, misfit_q16 = chi_square_q16 >> MISFIT_SHIFT;
-  const int32_t factor_q16 = misfit_q16 < least_q16 ? least_q16 : misfit_q16;
-  struct scaled pull_variance = scaled_mul(stated, misfit_factor(problem, factor_q16, GAINS_SHIFT_PULL));
-  pull_variance = fit_scaled_short(pull_variance);
-  const int gains_shift = problem->own ? GAINS_SHIFT_CALIBRATED : 0;
-  variance = scaled_mul(stated, misfit_factor(problem, factor_q16, gains_shift));
-  variance = fit_scaled_short(variance);
+  const uint32_t outside = is_outside(pad, at->x_q26, COLUMNS) + is_outside(pad, at->y_q26, ROWS);
+  const int32_t least_q16 = outside ? MISFIT_LEAST_OUTSIDE_Q16 : MISFIT_LEAST_Q16, misfit_q16 = chi_square_q16 >> MISFIT_SHIFT;
+  const int32_t factor_q16 = misfit_q16 < least_q16 ? least_q16 : misfit_q16, lacks_q16 = factor_q16 < 1 << 16 ? (1 << 16) - factor_q16 : 0;
+  const int32_t half_gains_q16 = (lacks_q16 * problem->by_gains_q12) >> 13;
+  struct scaled pull_variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(factor_q16 + half_gains_q16, -16)));
+  variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(problem->own ? factor_q16 : factor_q16 + 2 * half_gains_q16, -16)));
   int32_t x_q8, y_q8;
   struct scaled pulls = scaled_add(variance_of(room, outcome, PULL_X, 0, NULL), variance_of(room, outcome, PULL_Y, 0, NULL));
   pulls.exponent -= 1;
@@ -315,15 +263,15 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   result->q_sd_N = fit_scaled_float(scaled_mul(unit, pull_sd));
   result->location_sd_mm = fit_scaled_float(scaled_mul(length, root_of_product(place, variance)));
   struct scaled noise = fit_scaled_from(problem->base.noise_q22, -22);
-  result->location_noise_mm = fit_scaled_float(scaled_mul(length, root_of_product(place, scaled_mul(noise, noise))));
-  result->place_per_pull = fit_scaled_float(fit_scaled_sqrt(scaled_div(variance, pull_variance)));
+  result->location_noise_mm = fit_scaled_float(scaled_mul(length, scaled_mul(noise, fit_scaled_sqrt(place))));
+  result->variance_per_pull = fit_scaled_float(scaled_div(variance, pull_variance));
   struct scaled height = variance_of(room, outcome, AMPLITUDE, 0, NULL);
   result->force_sd_N = fit_scaled_float(scaled_mul(unit, root_of_product(height, variance)));
   struct scaled moved = scaled_mul(length, amplitude);
   result->moved_q20_mm[0] = moved_q20(outcome, moved, 0, x_q8);
   result->moved_q20_mm[1] = moved_q20(outcome, moved, 1, y_q8);
-  result->at_corner = outside == 2;
-  result->elongated = is_elongated(room, outcome, square, round, variance);
+  result->at_corner = outside >> 1;
+  result->elongated = pad->long_most_q15 == LONG_MOST_NEAR_ENDS_Q15 && fit_tangential_is_elongated(room, outcome, square, round, variance);
 }
 
 /* What a calibration knows of the pad. */

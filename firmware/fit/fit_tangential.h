@@ -94,7 +94,7 @@ struct fit_tangential {
   float q_sd_N;                            /* standard deviation of either */
   int32_t moved_q20_mm[2];                 /* how far along x the place would lie elsewhere if qx / force were larger
                                               by 1, and along y of qy; what moves across is a tenth of that */
-  float place_per_pull;                    /* by what more than q_sd_N the misfit has widened location_sd_mm */
+  float variance_per_pull;                 /* by what more than q_sd_N^2 the misfit has widened location_sd_mm^2 */
   bool at_corner; /* within a quarter of a pitch of two outer rows of sensors, or beyond: other shapes fit as well */
   bool elongated; /* the contact is not round, whatever the Gaussian makes of its tangential force */
 };

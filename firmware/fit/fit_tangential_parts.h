@@ -95,3 +95,31 @@ void fit_tangential_linearise(const struct problem *problem, const struct fit_ta
 /* fit_tangential_step.c: one Gauss-Newton step from there. */
 void fit_tangential_improve(const struct problem *problem, struct fit_tangential_unknowns *at, struct fit_tangential_room *room,
                             struct outcome *outcome);
+
+/* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
+ * diagonal of the inverse matrix. with_pull_q8: the element of the row for this pull, or NULL. */
+FIXED_INLINE struct scaled variance_of(const struct fit_tangential_room *room, const struct outcome *outcome, int u, int pull,
+                                       int32_t *with_pull_q8) {
+  const struct solution *solution = &outcome->solution;
+  int32_t w_q8[UNKNOWNS]; /* row of the inverse of L, times 2^half */
+  int32_t sum_q11 = 0;
+  for (int k = u; k < UNKNOWNS; k++) {
+    int32_t w = k == u ? 1 << 8 : 0;
+    for (int m = u; m < k; m++) {
+      // cppcheck-suppress uninitvar ; m < k, and the rounds before have set those
+      w -= (room->matrix[k][m] * w_q8[m]) >> 14;
+    }
+    w_q8[k] = w = fixed_clamp(shifted(w, solution->half[k]), -INT16_MAX, INT16_MAX);
+    sum_q11 += (((w * w) >> 9) * (solution->inverse_q13[k] >> 6)) >> 3;
+  }
+  if (with_pull_q8) {
+    *with_pull_q8 = w_q8[pull];
+  }
+  return fit_scaled_from(sum_q11, 2 * outcome->column_q[u] - 30 - 11);
+}
+
+FIXED_INLINE bool exceeds(struct scaled a, struct scaled b) { return scaled_sub(a, b).mantissa > 0; }
+
+/* fit_tangential_long.c. square: e1^2 + e2^2; round: A v. variance: of a reading of weight 1. */
+bool fit_tangential_is_elongated(const struct fit_tangential_room *room, const struct outcome *outcome, struct scaled square,
+                                 struct scaled round, struct scaled variance);

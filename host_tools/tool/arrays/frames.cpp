@@ -116,7 +116,7 @@ MEASURE_RECORD(pad_profile, FIELD(thickness_mm), FIELD(overhang_mm), FIELD(norma
                FIELD(spread_sd_mm2), FIELD(force_ratio), FIELD(tangential_scale), FIELD(tangential_scale_sd), FIELD(from_touch))
 MEASURE_RECORD(fit_pad)
 MEASURE_RECORD(fit_tangential, FIELD(valid), FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm), FIELD(location_noise_mm), FIELD(force_N),
-               FIELD(force_sd_N), FIELD(qx_N), FIELD(qy_N), FIELD(q_sd_N), FIELD(moved_q20_mm), FIELD(place_per_pull), FIELD(elongated))
+               FIELD(force_sd_N), FIELD(qx_N), FIELD(qy_N), FIELD(q_sd_N), FIELD(moved_q20_mm), FIELD(variance_per_pull), FIELD(elongated))
 MEASURE_RECORD(fit_shapes_pad)
 MEASURE_RECORD(fit_shapes_result, FIELD(shape), FIELD(x_mm), FIELD(y_mm), FIELD(force_N), FIELD(location_sd_mm), FIELD(force_sd_N),
                FIELD(length_mm), FIELD(along_x), FIELD(along_y), FIELD(angle_sd_rad), FIELD(qx_N), FIELD(qy_N), FIELD(chi_square))

@@ -73,7 +73,7 @@ static void begin(void) {
   found.force_N = between(0.2f, 8.0f);
   found.moved_q20_mm[0] = draw_between(-(8 << 20), 8 << 20);
   found.moved_q20_mm[1] = draw_between(-(8 << 20), 8 << 20);
-  found.place_per_pull = 1.0f;
+  found.variance_per_pull = 1.0f;
 }
 
 static void draw_frame(int32_t period_us) {

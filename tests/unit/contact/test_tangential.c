@@ -24,7 +24,7 @@ void setUp(void) {
                                   .qx_N = 0.75f,
                                   .qy_N = -1.0f,
                                   .q_sd_N = 0.04f,
-                                  .place_per_pull = 1.0f};
+                                  .variance_per_pull = 1.0f};
   input = (struct contact_input){.t_us = 5000000, .contact = true, .tangential = &found};
 }
 
@@ -103,7 +103,7 @@ TEST(a_misfit_widens_what_goes_as_it_widens_the_place) {
   found.q_sd_N = 0.2f;
   float taken[2];
   for (int i = 0; i < 2; i++) {
-    found.place_per_pull = 1.0f + 0.5f * (float)i;
+    found.variance_per_pull = 1.0f + 1.25f * (float)i;
     update(0);
     taken[i] = 0.25f + 0.0025f - load.location_sd_mm * load.location_sd_mm;
   }
