@@ -265,7 +265,7 @@ def joint_cases(corpus, text):
     for number, change in enumerate(changes):
         add(f"row_{number}", [line.replace(*change, 1) if line.startswith(change[0]) else line for line in lines])
     of_one = ("0/end: frames", "1/end: frames", "9/event: x", "00/event: x", "0/a/b: c")
-    for number, comment in enumerate((*of_one, "end: frames", "event: x", "note: 0/event: c", "grip: x", "packet: info sequence=1 t_us=1")):
+    for number, comment in enumerate((*of_one, "end: frames", "event: x", "note: 0/event: c", "grip: x")):
         add(f"comment_{number}", [*lines[: header + 1], f"# {comment}", *lines[header + 1 :]])
 
 
