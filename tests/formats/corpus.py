@@ -42,7 +42,8 @@ class Corpus:
     def recording(self, name, content, end="csv", devices=("",), rows_of="", is_whole=True, part=None):
         """rows_of: the name of a recording with the same rows; all of them if it is_whole. part: begin and end in seconds, and rows."""
         path = self.folder / f"{name}.{end}"
-        path.write_bytes(content)
+        with path.open("xb") as file:  # no name twice
+            file.write(content)
         for device in devices:
             for salvage in (False, True):
                 words = [name, end, *filter(None, [device]), *["salvage"] * salvage]
@@ -254,7 +255,7 @@ def joint_cases(corpus, text):
     header = header_at(lines)
 
     def add(what, content):
-        corpus.recording(f"two_{what}", text_of(content), devices=("", "AAAA", "bbbb", "CCCC"))
+        corpus.recording(f"two_joint_{what}", text_of(content), devices=("", "AAAA", "bbbb", "CCCC"))
 
     add("as_it_is", lines)
     add("no_devices", [line for line in lines if not line.startswith("# devices")])
@@ -265,7 +266,7 @@ def joint_cases(corpus, text):
     for number, change in enumerate(changes):
         add(f"row_{number}", [line.replace(*change, 1) if line.startswith(change[0]) else line for line in lines])
     of_one = ("0/end: frames", "1/end: frames", "9/event: x", "00/event: x", "0/a/b: c")
-    for number, comment in enumerate((*of_one, "end: frames", "event: x", "note: 0/event: c", "grip: x")):
+    for number, comment in enumerate((*of_one, "end: frames", "event: x", "note: 0/event: c", "grip: x", "packet: info sequence=1 t_us=1")):
         add(f"comment_{number}", [*lines[: header + 1], f"# {comment}", *lines[header + 1 :]])
 
 

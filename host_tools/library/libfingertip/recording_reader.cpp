@@ -374,12 +374,14 @@ void RecordingReader::read_comment(const std::string &text) {
   }
   std::string key(trim(std::string_view(text).substr(1, colon - 1)));
   std::uint32_t device = number_.value_or(0);
+  bool is_of_one = !joint_;
   if (std::size_t slash = key.find('/'); joint_ && slash != std::string::npos) {
     auto mine = device_of(std::string_view(key).substr(0, slash));
     if (!mine) {
       return;
     }
     device = *mine;
+    is_of_one = true;
     key = key.substr(slash + 1);
     if (key == "end") {
       read_end(std::string_view(text).substr(colon + 2));
@@ -394,6 +396,9 @@ void RecordingReader::read_comment(const std::string &text) {
   item.device = device;
   wire_info &info = state_.infos[device];
   if (key == "packet") {
+    if (!is_of_one) {
+      throw Damage{"a packet without a fingertip's number"};
+    }
     std::map<std::string, std::string, std::less<>> pairs;
     auto words = split(value, ' ');
     for (std::size_t i = 1; i < words.size(); i++) {

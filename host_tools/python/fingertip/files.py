@@ -527,6 +527,8 @@ class _Reading:
             if key == "end":
                 self.own_end = counts_of(value)
                 return
+        elif self.is_joint and key == "packet":
+            raise ValueError("a packet without a fingertip's number")
         elif self.is_joint and key == "devices":
             self.number = _choose_device(self.path, value.split(), self.serial)
         if key == "end":
