@@ -58,7 +58,7 @@
 #define REOPEN_SHIFT 4                    /* a sixteenth: what a sudden press must exceed after FRESH_ms */
 #define PAST_ms SECONDS(3)                /* time constant of what it keeps, and of a hold's own part; strips: 1 to 4 s */
 #define PAST_SHARE 1311                   /* 2 % of it is the sd until a release shows it; the twin's after-effect: 2.3 % rms */
-#define PAST_SHARE_LEAST 328              /* 0.5 %: releases may hide it */
+#define PAST_SHARE_LEAST 328              /* 0.5 %: releases may hide it (pads 21 to 24, gains alone) */
 #define PAST_SHARE_MOST 16384             /* a quarter; range */
 #define PAST_SHARE_FORCE 3277             /* a twentieth: twice the sd that it shows is the band of all, an eighth */
 #define PAST_SHOWS_ms ((uint32_t)MS(200)) /* after a contact; the remainder follows in 100 ms */

@@ -11,7 +11,6 @@
 /* No residual shows what moves all sensors that a contact presses, some four: their places, and the ends of a pad (report truth, over
  * time). */
 #define PLACES_Q26 13          /* (0.44 um)^2 in mm^2: half of the root of the mean square */
-#define USUAL_OFF_um 160       /* of others' arrays on boards: 0.1 to 0.23 mm each way */
 #define ENDS_SQUARE_Q26 328833 /* 0.07 mm */
 
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile, const struct contact_settings *settings,
@@ -25,7 +24,7 @@ void tangential_use(struct tangential_settings *tangential, const struct pad_pro
   tangential->tangential_scale = profile->tangential_scale;
   tangential->tangential_scale_sd = profile->tangential_scale_sd;
   tangential->from_touch = profile->from_touch != 0;
-  off_um = calibrated ? off_um : USUAL_OFF_um;
+  off_um = calibrated ? off_um : TANGENTIAL_USUAL_OFF_um;
   tangential->place_square_q26 = off_um * off_um * PLACES_Q26 + (bytes_from_f32(profile->overhang_mm) != 0 ? ENDS_SQUARE_Q26 : 0);
   float edges[PAD_EDGE_KINDS][PAD_EDGE_TERMS];
   memcpy(edges, &profile->edges, sizeof edges);

@@ -19,6 +19,8 @@ struct tangential_settings {
   float location_sd_limit_mm;                        /* UNCERTAIN above it */
 };
 
+#define TANGENTIAL_USUAL_OFF_um 160 /* of others' arrays on boards: 0.1 to 0.23 mm each way */
+
 /* The scales of this profile, with the calibration whose scales are in settings. off_um: how far that has sensors off their places, mean of
  * |x| + |y|, at most 4000; -1: not calibrated. */
 void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile, const struct contact_settings *settings,

@@ -15,8 +15,6 @@
 #define MISFIT_SHIFT 5                /* chi^2 / 32, by the coverage of calibrated pads */
 #define MISFIT_LEAST_Q16 1311         /* 0.02 */
 #define MISFIT_LEAST_OUTSIDE_Q16 4588 /* 0.07: there a contact's shape moves its place, and the readings hardly show it */
-/* Of the gains' part stays where chi^2 is small: of a tangential force half; of a location all, or nothing after a
- * calibration, which leaves no errors that rise over the pad. */
 
 /* Thickness of a layer in units of length: the widest term's sd is 0.478 of the thickness. On layers thinner than
  * the pitch standard deviations grow as (pitch / thickness)^2 (NUMERICS.md). */
@@ -238,6 +236,8 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   const uint32_t outside = is_outside(pad, at->x_q26, COLUMNS) + is_outside(pad, at->y_q26, ROWS);
   const int32_t least_q16 = outside ? MISFIT_LEAST_OUTSIDE_Q16 : MISFIT_LEAST_Q16, misfit_q16 = chi_square_q16 >> MISFIT_SHIFT;
   const int32_t factor_q16 = misfit_q16 < least_q16 ? least_q16 : misfit_q16, lacks_q16 = factor_q16 < 1 << 16 ? (1 << 16) - factor_q16 : 0;
+  /* Of the gains' part remains where chi^2 is small: of a tangential force half; of a location all, or none after a
+   * calibration, which leaves no errors that rise over the pad. */
   const int32_t half_gains_q16 = (lacks_q16 * problem->by_gains_q12) >> 13;
   struct scaled pull_variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(factor_q16 + half_gains_q16, -16)));
   variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(problem->own ? factor_q16 : factor_q16 + 2 * half_gains_q16, -16)));

@@ -35,7 +35,7 @@ static published published_of(const pad_profile &profile, double force_scale, do
   scales.force_scale = static_cast<float>(scale);
   scales.force_scale_sd = static_cast<float>(force_scale_sd);
   tangential_settings settings{};
-  tangential_use(&settings, &profile, &scales, force_scale > 0.0 ? 160 : -1);
+  tangential_use(&settings, &profile, &scales, force_scale > 0.0 ? TANGENTIAL_USUAL_OFF_um : -1);
   contact_input input{};
   input.contact = true;
   input.fit = &fit;

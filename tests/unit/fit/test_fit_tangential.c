@@ -412,6 +412,14 @@ TEST(test_long_contacts_are_reported_only_where_the_pad_ends_near) {
   }
 }
 
+TEST(test_contacts_at_corners_are_marked) {
+  for (int i = 0; i < 4; i++) {
+    int32_t readings[SENSORS];
+    read_contact(&(struct contact){i & 1 ? 7.2 : -6.3, i & 2 ? -16.2 : 15.3, 5.0, 0.0, 0.0, 4.0}, readings);
+    TEST_ASSERT_EQUAL(i == 3, estimate(readings, ALL).at_corner);
+  }
+}
+
 TEST(test_profiles_that_no_layer_has_are_refused) {
   const struct pad_profile good = profile_of(12.0);
   struct pad_profile wrong[] = {good, good, good, good, good};
