@@ -6,7 +6,7 @@ have HISTORY before them, each at FRAMES moments, evenly spread over those at wh
 0.15 s. So a hold of 10 s counts as much as one of 0.2 s.
 
 The constants of firmware/condition and firmware/fit that these pads judge were chosen on pads 1 to 4, 11 to 16, 21 to 24 and 31 to 34, and
-looked at on 7000 to 7005; others judge here.
+looked at on 7000 to 7005 and 8000 to 8002; others judge here.
 """
 
 import math
@@ -20,7 +20,7 @@ from fingertip.line import Flag
 from reporting import Steps
 from twin_player import TwinPlayer
 
-SEED, PADS = 8000, 10
+SEED, PADS = 9000, 10
 WEIGHT_N, FOOT, FORCES_N = 3, "sphere15", "2..10"
 PLACEMENTS_s, PRESSES_s, HISTORY, FRAMES = 150, 200, 20, 25
 BEFORE_s, AFTER_s, CHANGE = 0.15, 0.03, 0.05
