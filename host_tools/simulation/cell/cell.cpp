@@ -18,18 +18,19 @@ extern "C" {
 namespace fingertip::cell {
 namespace {
 
-constexpr double M = 1e-3; // m per mm
-// Time constants of a contact, normal and along it. The equal ones that MuJoCo has by default lift a sliding face off the object, by
-// friction times twice the constant times its speed. A held object creeps with the second over the ratio.
-constexpr double CONTACT_s = 1e-3, SLIDE_s = 20e-3, IMPRATIO = 1000.0;
+constexpr double M = 1e-3;                    // m per mm
+constexpr double CONTACT_s = 1e-3;            // time constant of a contact's normal force
 constexpr double GYRATION = 0.6;              // radius of, per half of the mean size
 constexpr double LOSS_s = 5e-4;               // of the rubber's normal spring
 constexpr double FREE_N_mm = 1.0;             // brings a free face back to its finger
 constexpr double JUMPS_mm = 5.0;              // a finger that is so far off was put there
 constexpr double RADIUS_mm = 4.0, AT_N = 4.0; // of contact, under that force
 constexpr double SPIN = 3.0 * M_PI / 16.0;    // torque that spins a Hertz contact, per radius, friction and force
-constexpr double FILTER_s = 1e-3;             // of speeds: contacts chatter in a slide, which rubber does not
-constexpr double LEAST_SHARE = 0.02;          // of the force: a point with less is not part of the patch
+constexpr double FILTER_s = 1e-3;             // of a slide's speed
+// Mean distance from the middle of a line or an area that is pressed evenly, over that of the ends or corners that MuJoCo has.
+constexpr double EVENLY = 0.5;
+constexpr double LEAST_SHARE = 0.02; // of the force: a point with less is not part of the patch
+constexpr int MOTIONS = 8;           // six of the object, and each face along its normal
 constexpr double PAD_mm = 6.0, TABLE_ROLLS = 10.0, AWAY_m = 10.0, APART_mm = 200.0;
 
 double pad_half_x_mm() { return PAD_OVERHANG_mm + static_cast<double>(geometry.x_mm[SENSORS - 1]); }
@@ -62,8 +63,8 @@ std::string xml_of(const KindOfGrasp &grasp) {
   const double up_mm = s * grasp.place_mm.x + c * grasp.place_mm.y;
   std::ostringstream xml;
   xml.precision(12);
-  xml << "<mujoco><option timestep='" << Cell::STEP_s << "' integrator='implicitfast' cone='elliptic' impratio='" << IMPRATIO
-      << "'><flag multiccd='enable' island='disable' autoreset='disable'/></option><default>"
+  xml << "<mujoco><option timestep='" << Cell::STEP_s
+      << "' integrator='implicitfast' cone='elliptic'><flag multiccd='enable' island='disable' autoreset='disable'/></option><default>"
          "<geom contype='0' conaffinity='0'/><pair solref='"
       << CONTACT_s << " 1' solimp='.95 .99 .0002'/></default><worldbody><geom name='table' type='plane' size='1 1 .1' pos='0 0 "
       << -M * size.z_mm << "'/>"
@@ -83,14 +84,13 @@ std::string xml_of(const KindOfGrasp &grasp) {
   for (const int side : {-1, 1}) {
     xml << "<body gravcomp='1' pos='" << side * M * (0.5 * grasp.width_mm + PAD_mm) << " " << -M * level_mm << " " << -M * up_mm
         << "'><inertial pos='0 0 0' mass='" << Cell::FACE_kg << "' diaginertia='1e-6 1e-6 1e-6'/>"
-        << "<joint type='slide' axis='" << -side << " 0 0'/><joint type='slide' axis='0 1 0'/>"
-        << "<joint type='slide' axis='0 0 1'/><geom name='face" << (side > 0) << "' type='box' size='" << M * PAD_mm << " "
+        << "<joint type='slide' axis='" << -side << " 0 0'/><geom name='face" << (side > 0) << "' type='box' size='" << M * PAD_mm << " "
         << M * pad_half_x_mm() << " " << M * pad_half_y_mm() << "' euler='" << turn * 180.0 / M_PI << " 0 0'/></body>";
   }
   xml << "</worldbody><contact><pair geom1='thing' geom2='table' condim='6' friction='" << grasp.table_friction << " "
       << grasp.table_friction << " .001 " << M * TABLE_ROLLS << " " << M * TABLE_ROLLS << "'/>";
   for (const int side : {0, 1}) {
-    xml << "<pair name='pair" << side << "' geom1='thing' geom2='face" << side << "' condim='4' solreffriction='" << SLIDE_s << " 1'/>";
+    xml << "<pair name='pair" << side << "' geom1='thing' geom2='face" << side << "' condim='1'/>";
   }
   xml << "</contact></mujoco>";
   return xml.str();
@@ -124,12 +124,15 @@ struct Cell::World {
   };
   struct Pad {
     KindOfPad kind;
-    double gives_mm_N;   // of finger and object
-    int face, pair, dof; // dof: the first of three, normal, level, upwards
+    double gives_mm_N; // of finger and object
+    int face, dof;
     std::array<double, 2> strength{}, follows_N{};
-    double elastic_N = 0.0, force_N = 0.0, shear_N_m = 0.0, friction = 0.0;
+    double elastic_N = 0.0, force_N = 0.0, friction = 0.0;
+    std::array<double, 3> pulled_m{}; // the rubber's face: level, upwards, turned at the arm of the patch
     Vector load_N, slide_mm_s;
     std::vector<Point> points;
+    std::array<mjtNum, 3> middle_m{}; // of their force
+    double arm_m = 0.0;
     bool slides = true;
   };
 
@@ -142,7 +145,6 @@ struct Cell::World {
       pads[i].kind = of.pads[i];
       pads[i].gives_mm_N = 0.5 / FINGERS_N_mm + 0.5 / of.stiffness_N_mm;
       pads[i].face = mj_name2id(model.get(), mjOBJ_GEOM, i == 0 ? "face0" : "face1");
-      pads[i].pair = mj_name2id(model.get(), mjOBJ_PAIR, i == 0 ? "pair0" : "pair1");
       pads[i].dof = model->body_dofadr[model->geom_bodyid[pads[i].face]];
       pads[i].strength = twin::relaxation_strengths(of.pads[i].relaxation);
     }
@@ -184,32 +186,48 @@ struct Cell::World {
     model->dof_damping[pad.dof] = damping;
   }
 
-  void shear(Pad &pad) {
-    pad.shear_N_m = grasp.shear_N_mm / M * std::cbrt(std::max(pad.force_N, 0.05) / AT_N);
-    for (int k = 1; k < 3; k++) {
-      const int dof = pad.dof + k;
-      const double spring_N = pad.shear_N_m * data->qpos[model->jnt_qposadr[model->dof_jntid[dof]]];
-      data->qfrc_applied[dof] = -spring_N;
-      model->dof_damping[dof] = grasp.rubber_N_s_mm / M;
-      (k == 1 ? pad.load_N.x : pad.load_N.y) = pad.points.empty() ? 0.0 : spring_N + grasp.rubber_N_s_mm / M * data->qvel[dof];
-    }
-  }
-
-  // Friction of the next step, by the speed of this one.
+  // The rubber gives along the patch as springs do, until friction gives way: its limit for force and torque together is an ellipsoid.
   void rub(Pad &pad, double friction_share) {
-    const double speed = std::hypot(pad.slide_mm_s.x, pad.slide_mm_s.y);
-    const double falls = pad.slides ? std::exp(-std::pow(speed / grasp.stribeck_mm_s, 2)) : 1.0;
+    const double before = std::hypot(pad.slide_mm_s.x, pad.slide_mm_s.y);
+    const double falls = std::exp(-std::pow(before / grasp.stribeck_mm_s, 2));
     pad.friction = friction_share * pad.kind.friction * (grasp.kinetic_share + (1.0 - grasp.kinetic_share) * falls);
-    mjtNum *friction = &model->pair_friction[5 * pad.pair];
-    friction[0] = friction[1] = pad.friction;
-    friction[2] = SPIN * pad.friction * M * RADIUS_mm * std::cbrt(pad.force_N / AT_N);
+    std::array<double, 3> pull_N{}, slide_m_s{};
+    if (pad.points.empty()) {
+      pad.pulled_m = {};
+    } else {
+      mjtNum moves[3 * MOTIONS], turns[3 * MOTIONS], speed[3], spin[3];
+      mj_jac(model.get(), data.get(), moves, turns, pad.middle_m.data(), object);
+      mju_mulMatVec(speed, moves, data->qvel, 3, MOTIONS);
+      mju_mulMatVec(spin, turns, data->qvel, 3, MOTIONS);
+      slide_m_s = {speed[1], speed[2], pad.arm_m * spin[0]};
+      const double shear_N_m = grasp.shear_N_mm / M * std::cbrt(std::max(pad.force_N, 0.05) / AT_N);
+      const double damping = grasp.rubber_N_s_mm / M;
+      for (std::size_t k = 0; k < 3; k++) {
+        pull_N[k] = shear_N_m * (pad.pulled_m[k] + STEP_s * slide_m_s[k]) + damping * slide_m_s[k];
+      }
+      const double held = pad.friction * pad.force_N / std::max(std::hypot(pull_N[0], pull_N[1], pull_N[2]), 1e-9);
+      for (std::size_t k = 0; k < 3; k++) {
+        pull_N[k] *= std::min(held, 1.0);
+        const double gives_m = (pull_N[k] - shear_N_m * pad.pulled_m[k]) / (shear_N_m + damping / STEP_s);
+        pad.pulled_m[k] += gives_m;
+        slide_m_s[k] -= gives_m / STEP_s;
+      }
+      const mjtNum force_N[3] = {0.0, -pull_N[0], -pull_N[1]}, torque_N_m[3] = {-pad.arm_m * pull_N[2], 0.0, 0.0};
+      mj_applyFT(model.get(), data.get(), force_N, torque_N_m, pad.middle_m.data(), object, data->qfrc_applied);
+    }
+    pad.load_N = {pull_N[0], pull_N[1]};
+    const double share = STEP_s / FILTER_s;
+    pad.slide_mm_s.x += share * (slide_m_s[0] / M - pad.slide_mm_s.x);
+    pad.slide_mm_s.y += share * (slide_m_s[1] / M - pad.slide_mm_s.y);
+    pad.slides = pad.points.empty() || std::hypot(pad.slide_mm_s.x, pad.slide_mm_s.y) > SLIDES_mm_s;
   }
 
-  // Where it touches, and how fast the object slides there.
+  // Where it touches.
   void look(Pad &pad) {
     pad.points.clear();
-    const mjtNum *middle = &data->geom_xpos[3 * pad.face];
-    double sum_N = 0.0, level_m = 0.0, up_m = 0.0;
+    const mjtNum *face_m = &data->geom_xpos[3 * pad.face];
+    double sum_N = 0.0, apart_m = 0.0;
+    std::array<mjtNum, 3> moment{};
     for (int i = 0; i < data->ncon; i++) {
       const mjContact &contact = data->contact[i];
       if (contact.geom[0] != pad.face && contact.geom[1] != pad.face) {
@@ -217,28 +235,21 @@ struct Cell::World {
       }
       mjtNum wrench[6];
       mj_contactForce(model.get(), data.get(), i, wrench);
-      const Point point{contact.pos[1] - middle[1], contact.pos[2] - middle[2], std::max(wrench[0], 1e-9)};
-      sum_N += point.force_N;
-      level_m += point.force_N * point.level_m;
-      up_m += point.force_N * point.up_m;
-      pad.points.push_back(point);
+      const double force_N = std::max(wrench[0], 1e-9);
+      sum_N += force_N;
+      mju_addToScl3(moment.data(), contact.pos, force_N);
+      // On the rubber, which has gone along.
+      pad.points.push_back({contact.pos[1] - face_m[1] - pad.pulled_m[0], contact.pos[2] - face_m[2] - pad.pulled_m[1], force_N});
     }
-    Vector slide;
-    if (!pad.points.empty()) {
-      const double arm_y = level_m / sum_N + middle[1] - data->xpos[3 * object + 1];
-      const double arm_z = up_m / sum_N + middle[2] - data->xpos[3 * object + 2];
-      const double arm_x = middle[0] - data->xpos[3 * object]; // to the face, less its thickness
-      const double at_x = arm_x + (arm_x > 0.0 ? -M * PAD_mm : M * PAD_mm);
-      const int dof = model->body_dofadr[object];
-      mjtNum spin[3];
-      mju_mulMatVec3(spin, &data->xmat[9 * object], &data->qvel[dof + 3]);
-      slide.x = (data->qvel[dof + 1] + spin[2] * at_x - spin[0] * arm_z - data->qvel[pad.dof + 1]) / M;
-      slide.y = (data->qvel[dof + 2] + spin[0] * arm_y - spin[1] * at_x - data->qvel[pad.dof + 2]) / M;
+    if (pad.points.empty()) {
+      return;
     }
-    const double share = STEP_s / FILTER_s;
-    pad.slide_mm_s.x += share * (slide.x - pad.slide_mm_s.x);
-    pad.slide_mm_s.y += share * (slide.y - pad.slide_mm_s.y);
-    pad.slides = pad.points.empty() || std::hypot(pad.slide_mm_s.x, pad.slide_mm_s.y) > SLIDES_mm_s;
+    mju_scl3(pad.middle_m.data(), moment.data(), 1.0 / sum_N);
+    const double level_m = pad.middle_m[1] - face_m[1] - pad.pulled_m[0], up_m = pad.middle_m[2] - face_m[2] - pad.pulled_m[1];
+    for (const Point &point : pad.points) {
+      apart_m += point.force_N / sum_N * std::hypot(point.level_m - level_m, point.up_m - up_m);
+    }
+    pad.arm_m = SPIN * M * RADIUS_mm * std::cbrt(pad.force_N / AT_N) + EVENLY * apart_m;
   }
 
   void step(double width_mm, const KindOfGrasp::Inputs &inputs) {
@@ -254,9 +265,9 @@ struct Cell::World {
       }
       return;
     }
+    mju_zero(data->qfrc_applied, MOTIONS);
     for (Pad &pad : pads) {
       press(pad, finger_mm, finger_mm_s);
-      shear(pad);
       rub(pad, inputs.friction_share);
     }
     const double heavier = inputs.mass_kg / model->body_mass[object];

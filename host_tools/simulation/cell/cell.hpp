@@ -1,15 +1,16 @@
 // The simulated cell: two pads of rubber on the fingers of a gripper, an object between them, a table under it until the hand lifts.
 //
-// MuJoCo has the object's free body, its contacts with both faces and the table, and their friction
-// (elliptic cones, torsion). Each face is a rigid box of FACE_kg that the rubber behind it holds:
+// MuJoCo has the object's free body, its contacts with both faces and the table, and the friction of the table. Each face is a rigid box
+// of FACE_kg that the rubber behind it holds:
 //   normal      a spring, force over indentation a power, in a row with the finger and the object, less
 //               what relaxes: the Prony series of simulation/twin/effects.hpp, as grippers hold a position
-//   tangential  a spring along each axis, its stiffness as the cube root of the force
+//   tangential  a spring along each axis, and one about the normal at the patch's mean arm, their stiffness as the cube root of the
+//               force. Friction limits them together, and they go along with what slides
 // both with the rubber's damping. What the fingertip's base bears is those springs' force, under the
-// patch of contact that MuJoCo finds: a point, a line or an area.
+// patch of contact that MuJoCo finds: a point, a line or an area. MuJoCo's own friction lifts a sliding face off the object.
 //
 // Friction is Coulomb's and falls with the speed of the slide (Stribeck), on each side by itself. A side
-// slides beyond SLIDES_mm_s: MuJoCo's contacts creep slower than that under any load that they hold.
+// slides beyond SLIDES_mm_s.
 //
 // The hand's frame: x level, along the pads, y upwards; fingertip 0's normal is x cross y, fingertip 1 faces it.
 //

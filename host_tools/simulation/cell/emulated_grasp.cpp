@@ -41,8 +41,9 @@ enum Stream : std::uint64_t { LINE = 841, PAD = 842 };
 
 constexpr const char *FACE = "sphere15";
 constexpr double LAYER_mm = 12.0;
-constexpr double FRICTION = 0.65; // static, before it falls
-constexpr std::uint64_t SEED = 1; // of pads and of the gripper's line
+constexpr double FRICTION = 0.65, FRICTION_FALLS = 0.5; // static, and by what share it falls
+constexpr double SLICE_s = 500e-6;                      // lockstep.mjs, by default
+constexpr std::uint64_t SEED = 1;                       // of pads and of the gripper's line
 constexpr int CLOCK_EXCHANGES = 8;
 constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
@@ -51,11 +52,6 @@ constexpr double LOST_N = 0.01;
 // Cast pads differ by 8 %, a calibration finds that to 1.2 %: the report's part truth.
 constexpr double PAD_SD = 0.08, CALIBRATION_SD = 0.012, FORCE_SCALE_SD = 0.05;
 constexpr double MORE_LOAD = 1.1, MORE_LOAD_N = 0.1;
-
-struct Options {
-  std::string cache;
-  double slice_us = 500.0, friction_falls = 0.5;
-};
 
 // A fingertip that is an emulated board, from the host's end of its USB line: it gets its pad's
 // profile and its calibration first, then it streams its readings.
@@ -149,7 +145,7 @@ struct EmulatedTrial {
 };
 
 // Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
-EmulatedTrial trial_of(const Options &options) {
+EmulatedTrial trial_of() {
   EmulatedTrial trial;
   KindOfGrasp &grasp = trial.grasp;
   grasp.pads[0].friction = 1.03 * FRICTION;
@@ -161,7 +157,7 @@ EmulatedTrial trial_of(const Options &options) {
   grasp.waits_s = 0.05;
   grasp.lift_mm = 4.0;
   grasp.lift_s = 0.5;
-  grasp.events = {{Event::Kind::slick, grasp.lift_s + 0.1, 0.03, options.friction_falls}};
+  grasp.events = {{Event::Kind::slick, grasp.lift_s + 0.1, 0.03, FRICTION_FALLS}};
   grasp.ends_s = grasp.lift_s + 0.4;
   trial.gripper = gripper_mechanics(gripper_models().front().model);
   return trial;
@@ -388,10 +384,10 @@ void put_u32(std::size_t value) {
   put(&word, sizeof word);
 }
 
-int serve(const Options &options) {
-  const Face face(FACE, LAYER_mm, options.cache);
+int serve(const std::string &cache) {
+  const Face face(FACE, LAYER_mm, cache);
   const pad_profile profile = pad::profile_over_own_sensors({LAYER_mm, 0.0, false});
-  const EmulatedTrial trial = trial_of(options);
+  const EmulatedTrial trial = trial_of();
   EmulatedGrasp grasp(trial, face, profile);
   Bytes bytes;
   while (!grasp.over()) {
@@ -410,7 +406,7 @@ int serve(const Options &options) {
       grasp.take(board, bytes, at_s);
     }
     const std::array<Bytes, 2> sent{grasp.to_send(0), grasp.to_send(1)};
-    grasp.run(t_s + 1e-6 * options.slice_us);
+    grasp.run(t_s + SLICE_s);
     put_u32(grasp.over());
     for (std::size_t f = 0; !grasp.over() && f < sent.size(); f++) {
       const Pressures sensed_Pa = grasp.sensed_Pa(f);
@@ -425,7 +421,7 @@ int serve(const Options &options) {
   out["face"] = FACE;
   out["mass_kg"] = trial.grasp.mass_kg;
   out["friction"] = FRICTION;
-  out["friction_falls"] = options.friction_falls;
+  out["friction_falls"] = FRICTION_FALLS;
   out.update(grasp.summary());
   const std::string text = out.dump();
   put(text.data(), text.size());
@@ -439,13 +435,11 @@ int main(int argc, char **argv) {
   CLI::App app("The world of a grasp for simulation/emulator/lockstep.mjs: an object, two fingertips' rubber, "
                "a gripper and the controller. It is lifted, and its friction falls.",
                "fingertip_cell_emulated");
-  fingertip::cell::Options options;
-  app.add_option("--friction-falls", options.friction_falls, "By this share")->check(CLI::Range(0.0, 0.9))->capture_default_str();
-  app.add_option("--slice-us", options.slice_us, "As the boards have it")->check(CLI::Range(100.0, 10000.0))->capture_default_str();
-  app.add_option("--cache", options.cache, "Folder of the contact tables")->required();
+  std::string cache;
+  app.add_option("--cache", cache, "Folder of the contact tables")->required();
   CLI11_PARSE(app, argc, argv);
   try {
-    return fingertip::cell::serve(options);
+    return fingertip::cell::serve(cache);
   } catch (const std::exception &error) {
     std::fprintf(stderr, "fingertip_cell_emulated: %s\n", error.what());
     return 1;

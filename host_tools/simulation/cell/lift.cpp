@@ -2,7 +2,6 @@
 
 #include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
-#include "libfingertip/random.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 #include "simulation/cell/gripper_server.hpp"
@@ -20,8 +19,6 @@
 namespace fingertip::cell {
 namespace {
 
-enum Stream : std::uint64_t { GAINS = 851 };
-
 constexpr std::chrono::microseconds ROUND{1000};
 constexpr std::int64_t LONGEST_ROUND_us = 10'000; // of the world's time
 constexpr std::int64_t LATE_us = 30'000;          // the world waits for what is later than that
@@ -30,13 +27,8 @@ constexpr std::size_t FINGERS = 2;
 std::vector<FingerProcess> fingers_of(const LiftOptions &options, const Place &place) {
   std::vector<FingerProcess> fingers;
   for (std::size_t i = 0; i < FINGERS; i++) {
-    FingerProcess finger = place.finger(i, 2 * options.seed + i);
-    Random random(options.seed, GAINS, i);
-    for (double &gain : finger.gain) {
-      gain = 1.0 + std::clamp(options.gain_spread.value_or(0.05) * random.normal(), -0.5, 0.5);
-    }
-    finger.calibrated_sd = options.gain_sd;
-    fingers.push_back(finger);
+    fingers.push_back(place.finger(i, options.seed, options.gain_spread.value_or(0.05)));
+    fingers.back().calibrated_sd = options.gain_sd;
   }
   return fingers;
 }

@@ -3,11 +3,13 @@
 #include "libfingertip/clock.hpp"
 #include "libfingertip/discovery.hpp"
 #include "libfingertip/error.hpp"
+#include "libfingertip/random.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/share_socket.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/advice.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
@@ -25,6 +27,7 @@ namespace fingertip::cell {
 namespace fs = std::filesystem;
 
 constexpr const char *SERIALS[SIDES.size()] = {"00000000000CE110", "00000000000CE111"};
+enum Stream : std::uint64_t { GAINS = 851 };
 constexpr std::chrono::milliseconds LOOK_INTERVAL{10};
 constexpr std::int64_t ROW_us = 2'000;
 constexpr std::size_t ROWS_BYTES = 4096;
@@ -54,13 +57,16 @@ Place::~Place() {
   close(lock_);
 }
 
-FingerProcess Place::finger(std::size_t side, std::uint64_t seed) const {
+FingerProcess Place::finger(std::size_t side, std::uint64_t seed, double gain_sd) const {
   FingerProcess finger;
   finger.serial = SERIALS[side];
   finger.link = port(SIDES[side]);
-  finger.seed = seed;
+  finger.seed = 2 * seed + side;
   finger.layer_mm = LAYER_mm;
-  finger.gain.fill(1.0);
+  Random random(finger.seed, GAINS, 0);
+  for (double &gain : finger.gain) {
+    gain = 1.0 + std::clamp(gain_sd * random.normal(), -0.5, 0.5);
+  }
   return finger;
 }
 

@@ -40,8 +40,8 @@ public:
 
   bool is_shared() const { return is_shared_; }
   std::string port(const std::string &name) const { return folder_ + "/" + name; }
-  // The process of this side, on its port; the caller fills in the rest.
-  FingerProcess finger(std::size_t side, std::uint64_t seed) const;
+  // The process of this side, on its port, and its sensors' gains; the caller fills in the rest.
+  FingerProcess finger(std::size_t side, std::uint64_t seed, double gain_sd) const;
 
 private:
   std::string folder_;

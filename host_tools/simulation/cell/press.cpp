@@ -15,7 +15,7 @@
 namespace fingertip::cell {
 namespace {
 
-enum Stream : std::uint64_t { GAINS = 861, PLACES = 862 };
+enum Stream : std::uint64_t { PLACES = 862 };
 
 constexpr double GRAVITY_m_s2 = 9.80665, AIR_Pa = 101325.0;
 constexpr std::chrono::milliseconds ROUND{1};
@@ -112,13 +112,8 @@ private:
 std::vector<FingerProcess> fingers_of(const PressOptions &options, const Place &place) {
   std::vector<FingerProcess> fingers;
   for (std::size_t i = 0; i < options.fingertips; i++) {
-    FingerProcess finger = place.finger(i, 2 * options.seed + i);
-    finger.parallel_bus = true;
-    Random random(finger.seed, GAINS, 0);
-    for (double &gain : finger.gain) {
-      gain = 1.0 + std::clamp(options.gain_spread.value_or(0.1) * random.normal(), -0.5, 0.5);
-    }
-    fingers.push_back(finger);
+    fingers.push_back(place.finger(i, options.seed, options.gain_spread.value_or(0.1)));
+    fingers.back().parallel_bus = true;
   }
   return fingers;
 }
@@ -210,8 +205,7 @@ void press(const PressOptions &options, const Place &place) {
 }
 
 void validate(const ValidatedOptions &options, std::optional<double> seconds, const Place &place) {
-  FingerProcess process = place.finger(0, 2 * options.seed);
-  process.gain.fill(1.0); // the pad has its own
+  FingerProcess process = place.finger(0, options.seed, 0.0); // the pad has its own gains
   process.parallel_bus = true;
   std::optional<ValidatedPad> pad(std::in_place, options);
   Fingers fingers(place, {process});
