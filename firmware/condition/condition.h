@@ -18,8 +18,8 @@
  * tared again after ZERO_BELOW_s, or after half a second if it is far below.
  *
  * Remainder: what rubber keeps of a press, which cannot be distinguished from a remaining force.
- * - Each sensor remembers its strongest press; the memory fades in 20 s. Half of the strongest memory of the pad counts
- * for all. An eighth of the memory is the band, or twice the share that this sensor has kept of others: this may remain
+ * - Each sensor remembers its strongest press; the memory fades in 20 s. Three quarters of the pad's strongest
+ * memory count for all. An eighth of the memory is the band, or twice the share that this sensor has kept of others: this may remain
  * above the level, and a quarter below. A contact closes within it.
  * - After a contact the remainder follows the reading within the band. It rises only for two seconds, and never as fast
  * as a press. Then a sudden press opens the gate above half of the band, and the level takes over the remainder slowly.
@@ -108,7 +108,7 @@ struct condition {
   uint32_t zero_risen; /* bitmap: the zero has taken more than opens the gate */
 
   /* Of the whole pad. */
-  int32_t memory_Pa_q10, reached_Pa_q10; /* as of a sensor, the strongest */
+  int32_t memory_Pa_q10, reached_Pa_q10; /* as of a sensor, three quarters of the strongest */
   int32_t drifted_Pa_q10;                /* by which any zero may have drifted in a contact; fades after it */
   int32_t taken_before_Pa_q10;           /* taken when the contact came, in doubt or not */
   int32_t strong_Pa_q10;                 /* a contact above it is more than its zeros may be off by */

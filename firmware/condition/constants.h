@@ -65,7 +65,7 @@
 #define PAST_LEAST_Pa 1000                /* less shows nothing beside noise and drift */
 #define PAST_SDS 2                        /* the zero is within as many of where it comes to rest; twin, seeds 21 to 24 */
 #define PAST_LEARN_SHIFT 2                /* a quarter of what each release shows; choice */
-#define CROSS_SHIFT 1                     /* half of the strongest memory counts for all: far sensors keep 2 % of a peak */
+#define CROSS_SHIFT 2                     /* all but a quarter of the strongest memory counts for all; strips, ZERO.md */
 #define FRESH_ms ((uint32_t)SECONDS(2))   /* after a contact: a remainder may rise */
 #define REMAINDER_ms MS(700)              /* time constant of a remainder; strips: 0.5 s at least */
 #define REMAINDER_DOWN_ms MS(100)         /* the same when a force goes at last */

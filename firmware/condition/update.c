@@ -180,7 +180,7 @@ static void remember(const struct step *step, int32_t rise_Pa_q10) {
     memory = step->steady_Pa_q10 < Pa_q10(SATURATED_Pa) ? step->steady_Pa_q10 : Pa_q10(SATURATED_Pa);
   }
   sensor->memory_Pa_q10 = memory;
-  condition->memory_Pa_q10 = larger(condition->memory_Pa_q10, memory);
+  condition->memory_Pa_q10 = larger(condition->memory_Pa_q10, memory - (memory >> CROSS_SHIFT));
 
   follow_past(step);
   const int32_t crept = pressed ? sensor->crept_Pa_q10 : faded(sensor->crept_Pa_q10, step->wander_share);
@@ -195,8 +195,8 @@ static void hold(const struct step *step) {
   const int32_t steady = step->steady_Pa_q10 < Pa_q10(SATURATED_Pa) ? step->steady_Pa_q10 : Pa_q10(SATURATED_Pa);
   const int32_t reached = larger(faded(sensor->reached_Pa_q10, step->memory_share), steady);
   sensor->reached_Pa_q10 = reached;
-  condition->reached_Pa_q10 = larger(condition->reached_Pa_q10, reached);
-  condition->margin_Pa_q10[step->k] = may_remain(sensor, larger(reached, condition->reached_Pa_q10 >> CROSS_SHIFT));
+  condition->reached_Pa_q10 = larger(condition->reached_Pa_q10, reached - (reached >> CROSS_SHIFT));
+  condition->margin_Pa_q10[step->k] = may_remain(sensor, larger(reached, condition->reached_Pa_q10));
   condition->strongest_Pa_q10 = larger(condition->strongest_Pa_q10, step->steady_Pa_q10);
   sensor->wander_Pa_q10 = faded(sensor->wander_Pa_q10, step->wander_share);
   sensor->taken_Pa_q10 = condition->sure ? 0 : faded(sensor->taken_Pa_q10, step->wander_share);
@@ -224,7 +224,7 @@ static void set_zero(const struct step *step, int32_t remainder_Pa_q10, int32_t 
   sensor->wander_Pa_q10 = faded(sensor->wander_Pa_q10, step->wander_share) + level_moved_Pa_q10;
   sensor->taken_Pa_q10 = faded(sensor->taken_Pa_q10, step->wander_share) + moved_Pa_q10;
   sensor->crept_Pa_q10 = spread > 0 ? 0 : sensor->crept_Pa_q10;
-  set_bit(&condition->zero_risen, step->k, larger(sensor->taken_Pa_q10, spread) > Pa_q10(GATE_OPEN_Pa));
+  set_bit(&condition->zero_risen, step->k, larger(sensor->taken_Pa_q10, spread) > condition->gate.open_Pa_q10);
 }
 
 /* While the level may be off by a spread it takes over all readings within it: so nothing shows what rubber keeps. Returns whether it has.
@@ -252,7 +252,7 @@ static bool settle(const struct step *step) {
 
 static struct band band_of(const struct step *step, bool fresh) {
   const struct condition *condition = step->condition;
-  const int32_t memory = larger(step->sensor->memory_Pa_q10, condition->memory_Pa_q10 >> CROSS_SHIFT);
+  const int32_t memory = larger(step->sensor->memory_Pa_q10, condition->memory_Pa_q10);
   const int32_t drifted = condition->drifted_Pa_q10;
   const int32_t highest = may_remain(step->sensor, memory) + drifted;
   return (struct band){

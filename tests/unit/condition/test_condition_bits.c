@@ -96,8 +96,8 @@ static uint32_t course(void) {
 }
 
 TEST(test_frames_are_conditioned_the_same_to_the_bit) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x8AF92143, 0x650B7EDE, 0xE991371A, 0xA895B2CC,
-                                                 0xE4DCDE68, 0x464060BF, 0x547A2ECB, 0x6AC72E30};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x83DC13A4, 0x3AE0ABE5, 0x1DB2B19B, 0x5402C885,
+                                                 0xD872214B, 0xC9BC7BFA, 0x51B77541, 0x99F331DA};
   uint32_t found[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x7A65726F));
   for (int i = 0; i < COURSES; i++) {

@@ -87,7 +87,7 @@ TEST(test_far_sensors_stand_off_too) {
   frame.pressure_Pa_q10[7] = AMBIENT + 20000 * Pa;
   run_s(5);
   fill(AMBIENT);
-  frame.pressure_Pa_q10[12] = AMBIENT + 500 * Pa;
+  frame.pressure_Pa_q10[12] = AMBIENT + 1400 * Pa;
   watch_s(60, 0, 0);
   TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
   TEST_ASSERT_FALSE(conditioned.contact);
