@@ -50,8 +50,6 @@ std::array<DeviceNews, GraspLoop::FINGERS> GraspLoop::meet(const std::function<b
       } else if (news.kind == DeviceNews::Kind::ended) {
         loops_[news.device]->rethrow();
         throw Interrupted();
-      } else if (ready[news.device]) {
-        early_.push_back(std::move(news));
       }
     }
   }
@@ -63,10 +61,6 @@ void GraspLoop::begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen, cons
   core_.emplace(settings, gripper->traits());
   core_->take(*status_);
   gripper_ = std::make_unique<GripperThread>(std::move(gripper), std::move(reopen));
-  for (DeviceNews &news : early_) {
-    put({Kind::device, steady_now_us(), std::move(news)});
-  }
-  early_.clear();
   for (const auto &loop : loops_) {
     loop->start();
   }

@@ -108,7 +108,6 @@ private:
   Options options_;
   DeviceFeed feed_;
   std::array<std::unique_ptr<DeviceLoop>, FINGERS> loops_;
-  std::vector<DeviceNews> early_; // packets before the beginning
   std::size_t running_ = FINGERS;
 
   mutable std::mutex core_mutex_; // of the core

@@ -1,31 +1,25 @@
-"""What a user without a fingertip meets: `fingertip simulate`, the README's example, reading a recording, and a release built twice."""
+"""What a user without a fingertip meets: `fingertip simulate`, the README's example, and a release built twice."""
 
 # real time: how long things take
-import io
 import os
 import subprocess
 import sys
 import time
 
-import numpy as np
 from nightly import ROOT, Programs, job, run
 from package import read
 from readme_example import environment_of, run_example, runs, simulated
 
-from fingertip import files
 from fingertip.files import InputError
 
 TOOL, SECONDS = "host_tools/tool/cli/fingertip", 10
 REPEATS = 5  # the best counts: this computer may have other work
 
 
-def best_s(work, clock=time.monotonic):
-    def once():
-        begin_s = clock()
-        work()
-        return clock() - begin_s
-
-    return min(once() for _ in range(REPEATS))
+def help_s(tool):
+    begin_s = time.monotonic()
+    run(tool, "--help")
+    return time.monotonic() - begin_s
 
 
 def ready_s(tool, environment):
@@ -53,34 +47,12 @@ def simulate(build):
             found = read("sim:", SECONDS)
     return {
         "readme_words": len((ROOT / "README.md").read_text(encoding="utf-8").split()),
-        "help_ms": round(1000 * best_s(lambda: run(tool, "--help")), 1),
+        "help_ms": round(1000 * min(help_s(tool) for _ in range(REPEATS)), 1),
         "simulate_ready_s": round(soonest_s, 3),
         "simulate_seconds": SECONDS,
         "simulate_fps": round(found["fps"], 1),
         "simulate_lost": found["lost"],
         "python_example_runs": int(runs(lines)),
-    }
-
-
-@job("newcomer")
-def reading(build, times=8):
-    """A recording by fingertip.read_recording, which judges every cell, and its numbers alone by numpy.loadtxt: processor time."""
-    with Programs(build) as programs:
-        environment, path = environment_of(programs.folder), programs.folder / "press.csv"
-        with simulated(build / TOOL, environment):
-            for words in (("set", "osr=256", "rate=max"), ("record", path, "--seconds", SECONDS)):
-                run(build / TOOL, *words, env=environment)
-        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-        begin = next(at for at, line in enumerate(lines) if not line.startswith("#")) + 1
-        rows = times * [line for line in lines[begin:] if not line.startswith("#")]
-        path.write_text("".join(lines[:begin] + rows), encoding="utf-8")
-        alone = "".join(rows).replace(",,", ",nan,").replace(",,", ",nan,").replace(",\n", ",nan\n").encode("ascii")
-        read_s = best_s(lambda: files.read_recording(path), time.process_time)
-        loadtxt_s = best_s(lambda: np.loadtxt(io.BytesIO(alone), delimiter=",", comments=None), time.process_time)
-    return {
-        "reader_rows": len(rows),
-        "reader_us_per_row": round(1e6 * read_s / len(rows), 1),
-        "reader_times_loadtxt": round(read_s / loadtxt_s, 2),
     }
 
 

@@ -29,7 +29,7 @@ from fingertip.files import InputError  # noqa: E402
 
 REPORT = ROOT / "build/report"
 PATIENCE_s = 120
-OF_TIME = re.compile(r"_(us|ms|s|fps|percent|seconds|minutes|per_s|per_minute|from_nothing)$|_ready_|seconds_|minutes_|_loadtxt$")
+OF_TIME = re.compile(r"_(us|ms|s|fps|percent|seconds|minutes|per_s|per_minute|from_nothing)$|_ready_|seconds_|minutes_")
 
 
 def job(name, *goals):

@@ -1,7 +1,9 @@
 """What the Python package costs a program that takes every frame at the highest rate, and what it loses."""
 
 # real time: processor time of a program at its pace
+import itertools
 import json
+import os
 import subprocess
 import sys
 import time
@@ -85,18 +87,25 @@ def recordings(build):
     return found | {"python_mcap_us_per_row_over_csv": round(found["python_mcap_us_per_row"] / found["python_csv_us_per_row"], 2)}
 
 
-@job("tools", ("record1_lost", "<=", 0), ("record8_lost", "<=", 0), ("record16_lost", "<=", 0))
+@job("tools", ("record1_lost", "<=", 0), ("record8_lost", "<=", 0), ("record16_lost", "<=", 0), ("stall_2s_lost", "<=", 0))
 def many(build):
-    """Packets that `record --all` to MCAP counts as lost, of one, eight and sixteen fingertips at the highest rate."""
-    found = {}
-    for count in (1, 8, 16):
+    """Packets that `record --all` counts as lost, of one, eight and sixteen fingertips at the highest rate; and those of a pipe that nobody reads
+    for two seconds in the middle of it."""
+    found = {"stall_2s_lost": 0}
+    for count, name, stalls_at in itertools.product((1, 8, 16), ("many.mcap", "many.csv"), (0, 100_000)):
         with Programs(build) as programs:
             ports = [programs.fake_device(f"{i:04X}", f"rate={RATE_Hz}") for i in range(count)]
-            file = programs.folder / "many.mcap"
+            file, pipe = programs.folder / name, programs.folder / f"pipe_{name}"
+            os.mkfifo(pipe)
+            reads = f"(head -c {count * stalls_at}; sleep {2 * bool(stalls_at)}; cat) < {pipe} > {file}"
+            disk = programs.start("sh", "-c", reads)
             environment = programs.environment | {"FINGERTIP_PORT": ":".join(map(str, ports))}
-            run(build / "host_tools/tool/cli/fingertip", "record", file, "--all", "--seconds", MANY_s, env=environment)
+            words = ("record", pipe, "--all", "--overwrite", "--seconds", MANY_s)
+            run(build / "host_tools/tool/cli/fingertip", *words, env=environment)
+            disk.wait()
             ends = [read_recording(file, serial=f"{i:04X}" if count > 1 else None, columns=("t_us", "frame")).end for i in range(count)]
-            found[f"record{count}_lost"] = sum(int(end["dropped_packets"]) for end in ends)
+            figure = "stall_2s_lost" if stalls_at else f"record{count}_lost"
+            found[figure] = found.get(figure, 0) + sum(int(end["dropped_packets"]) for end in ends)
     return found
 
 

@@ -2,7 +2,6 @@
 
 # real time: how long the suite takes
 import contextlib
-import json
 import os
 import re
 import shutil
@@ -31,8 +30,6 @@ with open(sys.argv[2], "wb", buffering=0) as file:
             file.write(block)
         os.fsync(file)
 """
-# How test programs report that parts of them were skipped, and how many.
-IN_PART = re.compile(r"^OK \(.*skipped=(\d+)|^\[  SKIPPED \] (\d+) test|^(?:#|\u2139) skipped ([1-9]\d*)|\b([1-9]\d*) Ignored", re.M)
 
 
 @contextlib.contextmanager
@@ -96,17 +93,9 @@ def summary(label, runs):
 def runs(build):
     whole = [(busy, *run_suite(build, None, busy)) for busy in (False, True) for _ in range(WHOLE // 2)]
     quick = [(busy, *run_suite(build, "quick", busy)) for busy in (False, True) for _ in range(QUICK // 2)]
-    listed = json.loads(run("ctest", "--test-dir", build, "--show-only=json-v1"))["tests"]
-    labels = {test["name"]: each["value"][0] for test in listed for each in test.get("properties", []) if each["name"] == "LABELS"}
     times = {name: seconds for busy, _, tests in whole if not busy for name, (seconds, _, _) in tests.items()}
-    by_label, in_part = {}, {}
-    for name, seconds in times.items():
-        by_label[labels.get(name, "none")] = by_label.get(labels.get(name, "none"), 0) + seconds
     for _, _, tests in whole:
         for name, (_, status, output) in tests.items():
-            parts = sum(int(next(filter(None, match.groups()))) for match in IN_PART.finditer(output))
-            if parts and status == "run":
-                in_part[name] = parts
             if status == "fail":
                 print(f"{name}:\n{output[-3000:]}")
     waiting = waits(ROOT)
@@ -119,8 +108,6 @@ def runs(build):
         "whole_minutes_busy": max(seconds / 60 for busy, seconds, _ in whole if busy),
         "quick_seconds": max(seconds for busy, seconds, _ in quick if not busy),
         "skipped": with_status(whole, "skipped"),
-        "skipped_in_part": dict(sorted(in_part.items())),
-        "seconds_by_label": dict(sorted(by_label.items())),
         "longest": dict(sorted(times.items(), key=lambda item: -item[1])[:LONGEST]),
         "sleeps": sum(what == "sleep" for _, _, what in waiting),
         "retries": sum(what == "retry" for _, _, what in waiting),

@@ -35,33 +35,36 @@ enum Opcode : std::uint8_t {
 constexpr std::size_t CHUNK_bytes = 1 << 20;
 constexpr std::uint64_t CHUNK_ns = 1'000'000'000;
 
-void put_text(std::string &bytes, std::string_view text) {
+struct Raw { /* without its length */
+  std::string_view bytes;
+};
+
+template <typename Number> std::enable_if_t<std::is_arithmetic_v<Number>> put(std::string &bytes, Number number) {
+  put_number(bytes, number);
+}
+void put(std::string &bytes, Raw raw) { bytes += raw.bytes; }
+void put(std::string &bytes, std::string_view text) {
   put_number(bytes, static_cast<std::uint32_t>(text.size()));
   bytes += text;
 }
 
-void put_pairs(std::string &bytes, const Pairs &pairs) {
-  std::string content;
-  for (const auto &[key, value] : pairs) {
-    put_text(content, key);
-    put_text(content, value);
-  }
-  put_text(bytes, content);
-}
-
-std::string record(Opcode opcode, std::string_view content) {
-  std::string bytes(1, static_cast<char>(opcode));
-  put_number(bytes, std::uint64_t{content.size()});
-  bytes += content;
+template <typename... Fields> std::string bytes_of(const Fields &...fields) {
+  std::string bytes;
+  (put(bytes, fields), ...);
   return bytes;
 }
 
-std::string joined(const std::vector<std::string> &parts) {
-  std::string all;
-  for (const std::string &part : parts) {
-    all += part;
+template <typename... Fields> std::string record(Opcode opcode, const Fields &...fields) {
+  const std::string content = bytes_of(fields...);
+  return bytes_of(static_cast<std::uint8_t>(opcode), std::uint64_t{content.size()}, Raw{content});
+}
+
+std::string text_of(const Pairs &pairs) {
+  std::string content;
+  for (const auto &[key, value] : pairs) {
+    content += bytes_of(key, value);
   }
-  return all;
+  return content;
 }
 
 std::uint32_t crc_of(std::string_view bytes) { return crc32_iso_hdlc(reinterpret_cast<const std::uint8_t *>(bytes.data()), bytes.size()); }
@@ -172,16 +175,10 @@ void Writer::Span::take(const Span &other) {
   last_ns = std::max(last_ns, other.last_ns);
 }
 
-void Writer::Span::put(std::string &bytes) const {
-  put_number(bytes, first_ns <= last_ns ? first_ns : 0);
-  put_number(bytes, last_ns);
-}
+std::string Writer::Span::bytes() const { return bytes_of(first_ns <= last_ns ? first_ns : 0, last_ns); }
 
 Writer::Writer(Append append, const std::string &profile, const std::string &library) : append_(std::move(append)) {
-  std::string content;
-  put_text(content, profile);
-  put_text(content, library);
-  this->append(std::string(MAGIC, sizeof MAGIC) + record(HEADER, content));
+  this->append(std::string(MAGIC, sizeof MAGIC) + record(HEADER, profile, library));
 }
 
 /* Where it begins. */
@@ -194,38 +191,21 @@ std::uint64_t Writer::append(const std::string &bytes) {
 
 std::uint16_t Writer::schema(const std::string &name, const std::string &encoding, const std::string &data) {
   auto id = static_cast<std::uint16_t>(schemas_.size() + 1);
-  std::string content;
-  put_number(content, id);
-  put_text(content, name);
-  put_text(content, encoding);
-  put_text(content, data);
-  schemas_.push_back(record(SCHEMA, content));
+  schemas_.push_back(record(SCHEMA, id, name, encoding, data));
   append(schemas_.back());
   return id;
 }
 
 std::uint16_t Writer::channel(const std::string &topic, std::uint16_t schema, const std::string &encoding, const Pairs &metadata) {
   auto id = static_cast<std::uint16_t>(channels_.size() + 1);
-  std::string content;
-  put_number(content, id);
-  put_number(content, schema);
-  put_text(content, topic);
-  put_text(content, encoding);
-  put_pairs(content, metadata);
-  channels_.push_back(record(CHANNEL, content));
+  channels_.push_back(record(CHANNEL, id, schema, topic, encoding, text_of(metadata)));
   append(channels_.back());
   return id;
 }
 
 void Writer::metadata(const std::string &name, const Pairs &pairs) {
-  std::string content;
-  put_text(content, name);
-  put_pairs(content, pairs);
-  std::string whole = record(METADATA, content), index;
-  put_number(index, append(whole));
-  put_number(index, std::uint64_t{whole.size()});
-  put_text(index, name);
-  metadata_.push_back(record(METADATA_INDEX, index));
+  const std::string whole = record(METADATA, name, text_of(pairs));
+  metadata_.push_back(record(METADATA_INDEX, append(whole), std::uint64_t{whole.size()}, name));
 }
 
 void Writer::message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data) {
@@ -238,13 +218,7 @@ void Writer::message(std::uint16_t channel, std::uint64_t time_ns, std::string_v
   }
   chunk_span_.take({time_ns, time_ns});
   indexes_[channel].emplace_back(time_ns, records_.size());
-  std::string content;
-  put_number(content, channel);
-  put_number(content, static_cast<std::uint32_t>(counts_[channel]++));
-  put_number(content, time_ns);
-  put_number(content, time_ns);
-  content += data;
-  records_ += record(MESSAGE, content);
+  records_ += record(MESSAGE, channel, static_cast<std::uint32_t>(counts_[channel]++), time_ns, time_ns, Raw{data});
 }
 
 void Writer::end_chunk() {
@@ -252,38 +226,20 @@ void Writer::end_chunk() {
     return;
   }
   const std::string chunk_bytes = packed(records_);
-  std::string content;
-  chunk_span_.put(content);
-  put_number(content, std::uint64_t{records_.size()});
-  put_number(content, crc_of(records_));
-  put_text(content, COMPRESSION);
-  put_number(content, std::uint64_t{chunk_bytes.size()});
-  content += chunk_bytes;
-  const std::string chunk = record(CHUNK, content);
+  const std::uint64_t size = records_.size(), packed_size = chunk_bytes.size();
+  const std::string span = chunk_span_.bytes();
+  const std::string chunk = record(CHUNK, Raw{span}, size, crc_of(records_), COMPRESSION, packed_size, Raw{chunk_bytes});
   std::string indexes, places;
   for (const auto &[channel, entries] : indexes_) {
-    put_number(places, channel);
-    put_number(places, length_ + chunk.size() + indexes.size());
-    std::string times, index;
+    places += bytes_of(channel, length_ + chunk.size() + indexes.size());
+    std::string times;
     for (const auto &[time_ns, offset] : entries) {
-      put_number(times, time_ns);
-      put_number(times, offset);
+      times += bytes_of(time_ns, offset);
     }
-    put_number(index, channel);
-    put_text(index, times);
-    indexes += record(MESSAGE_INDEX, index);
+    indexes += record(MESSAGE_INDEX, channel, times);
   }
-  const std::string whole = chunk + indexes;
-  std::string index;
-  chunk_span_.put(index);
-  put_number(index, append(whole));
-  put_number(index, std::uint64_t{chunk.size()});
-  put_text(index, places);
-  put_number(index, std::uint64_t{indexes.size()});
-  put_text(index, COMPRESSION);
-  put_number(index, std::uint64_t{chunk_bytes.size()});
-  put_number(index, std::uint64_t{records_.size()});
-  chunks_.push_back(record(CHUNK_INDEX, index));
+  const std::uint64_t at = append(chunk + indexes), chunk_size = chunk.size(), indexes_size = indexes.size();
+  chunks_.push_back(record(CHUNK_INDEX, Raw{span}, at, chunk_size, places, indexes_size, COMPRESSION, packed_size, size));
   span_.take(chunk_span_);
   records_.clear();
   indexes_.clear();
@@ -292,45 +248,31 @@ void Writer::end_chunk() {
 
 void Writer::finish() {
   end_chunk();
-  std::string data_end, counts, statistics;
-  put_number(data_end, std::uint32_t{0}); /* no CRC over all of it */
-  data_end = record(DATA_END, data_end);
+  const std::string data_end = record(DATA_END, std::uint32_t{0}); /* no CRC over all of it */
+  std::string counts;
   std::uint64_t messages = 0;
   for (const auto &[channel, count] : counts_) {
-    put_number(counts, channel);
-    put_number(counts, count);
+    counts += bytes_of(channel, count);
     messages += count;
   }
-  put_number(statistics, messages);
-  put_number(statistics, static_cast<std::uint16_t>(schemas_.size()));
-  for (const std::size_t count : {channels_.size(), std::size_t{0} /* of attachments */, metadata_.size(), chunks_.size()}) {
-    put_number(statistics, static_cast<std::uint32_t>(count));
-  }
-  span_.put(statistics);
-  put_text(statistics, counts);
+  const auto count = [](const auto &all) { return static_cast<std::uint32_t>(all.size()); };
+  const std::string statistics = record(STATISTICS, messages, static_cast<std::uint16_t>(schemas_.size()), count(channels_),
+                                        std::uint32_t{0} /* attachments */, count(metadata_), count(chunks_), Raw{span_.bytes()}, counts);
   const std::uint64_t start = length_ + data_end.size();
   std::string summary, offsets;
   const std::pair<Opcode, std::string> groups[] = {
-      {SCHEMA, joined(schemas_)},     {CHANNEL, joined(channels_)},        {STATISTICS, record(STATISTICS, statistics)},
-      {CHUNK_INDEX, joined(chunks_)}, {METADATA_INDEX, joined(metadata_)},
+      {SCHEMA, joined(schemas_, "")},     {CHANNEL, joined(channels_, "")},        {STATISTICS, statistics},
+      {CHUNK_INDEX, joined(chunks_, "")}, {METADATA_INDEX, joined(metadata_, "")},
   };
   for (const auto &[opcode, group] : groups) {
     if (!group.empty()) {
-      std::string offset;
-      put_number(offset, static_cast<std::uint8_t>(opcode));
-      put_number(offset, start + summary.size());
-      put_number(offset, std::uint64_t{group.size()});
-      offsets += record(SUMMARY_OFFSET, offset);
+      offsets += record(SUMMARY_OFFSET, static_cast<std::uint8_t>(opcode), start + summary.size(), std::uint64_t{group.size()});
       summary += group;
     }
   }
   /* The footer's CRC is over all of the summary and the footer before it. */
   constexpr std::uint64_t FOOTER_BYTES = 20;
-  std::string end = summary + offsets;
-  put_number(end, static_cast<std::uint8_t>(FOOTER));
-  put_number(end, FOOTER_BYTES);
-  put_number(end, start);
-  put_number(end, start + summary.size());
+  std::string end = summary + offsets + bytes_of(static_cast<std::uint8_t>(FOOTER), FOOTER_BYTES, start, start + summary.size());
   put_number(end, crc_of(end));
   append(data_end + end + std::string(MAGIC, sizeof MAGIC));
 }

@@ -57,7 +57,7 @@ private:
   struct Span {
     std::uint64_t first_ns = UINT64_MAX, last_ns = 0;
     void take(const Span &other);
-    void put(std::string &bytes) const;
+    std::string bytes() const;
   };
   using Index = std::vector<std::pair<std::uint64_t, std::uint64_t>>; /* time, offset in the chunk */
 

@@ -8,35 +8,23 @@
 
 namespace fingertip {
 
-ProgressBar::ProgressBar(const std::string &what, Lines lines)
-    : what_(printable(what)), terminal_(isatty(STDERR_FILENO) != 0), step_percent_(terminal_                ? 1
-                                                                                   : lines == Lines::tenths ? 10
-                                                                                                            : 0) {}
+ProgressBar::ProgressBar(const std::string &what)
+    : what_(printable(what)), in_place_(isatty(STDERR_FILENO) != 0), next_(begun_ + std::chrono::milliseconds(in_place_ ? 0 : 10000)) {}
 
-ProgressBar::~ProgressBar() {
-  if (terminal_ && shown_percent_ >= 0) {
-    std::fprintf(stderr, "\r\x1b[K");
-  }
-}
+ProgressBar::~ProgressBar() { std::fputs(in_place_ && next_ != begun_ ? "\r\x1b[K" : "", stderr); }
 
 void ProgressBar::show(double share) {
-  if (step_percent_ == 0) {
+  const HostTime now = host_now();
+  if (now < next_) {
     return;
   }
-  const int percent = static_cast<int>(100.0 * std::clamp(share, 0.0, 1.0)) / step_percent_ * step_percent_;
-  if (percent == shown_percent_) {
-    return;
+  next_ = now + std::chrono::milliseconds(in_place_ ? 200 : 10000);
+  const double spent_s = std::chrono::duration<double>(now - begun_).count();
+  std::fprintf(stderr, in_place_ ? "\r\x1b[K%s %.0f %%" : "%s %.0f %%", what_.c_str(), 100 * std::clamp(share, 0.0, 1.0));
+  if (spent_s > 2) {
+    std::fprintf(stderr, ", %.0f s left", spent_s * (1 / std::clamp(share, 1e-3, 1.0) - 1));
   }
-  shown_percent_ = percent;
-  if (!terminal_) {
-    std::fprintf(stderr, "%s %d %%\n", what_.c_str(), percent);
-    return;
-  }
-  constexpr int WIDTH = 40;
-  const int full = WIDTH * percent / 100;
-  std::fprintf(stderr, "\r%s [%s%s] %3d %%", what_.c_str(), std::string(full, '#').c_str(), std::string(WIDTH - full, '.').c_str(),
-               percent);
-  std::fflush(stderr);
+  std::fputs(in_place_ ? "" : "\n", stderr);
 }
 
 } // namespace fingertip

@@ -1,5 +1,7 @@
-/* The progress of a long job, on stderr: a bar that is redrawn on a terminal; elsewhere a line each tenth, or nothing. */
+/* The progress of a long job and the time that is left, on stderr: in place on a terminal, elsewhere a line every ten seconds. */
 #pragma once
+
+#include "libfingertip/clock.hpp"
 
 #include <string>
 
@@ -7,10 +9,8 @@ namespace fingertip {
 
 class ProgressBar {
 public:
-  enum class Lines { tenths, none }; /* where there is no terminal */
-
-  ProgressBar(const std::string &what, Lines lines);
-  ~ProgressBar(); /* the bar goes, so that the next message has the line for itself */
+  explicit ProgressBar(const std::string &what);
+  ~ProgressBar(); /* on a terminal the next message has the line for itself */
   ProgressBar(const ProgressBar &) = delete;
   ProgressBar &operator=(const ProgressBar &) = delete;
 
@@ -18,9 +18,8 @@ public:
 
 private:
   std::string what_;
-  bool terminal_;
-  int step_percent_;
-  int shown_percent_ = -1;
+  bool in_place_;
+  HostTime begun_ = host_now(), next_;
 };
 
 } // namespace fingertip

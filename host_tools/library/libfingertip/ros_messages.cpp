@@ -32,6 +32,10 @@ public:
     bytes_ += '\0';
   }
   void put(const char *text) { put(std::string_view(text)); }
+  template <typename First, typename Second, typename... More> void put(const First &first, const Second &second, const More &...more) {
+    put(first);
+    put(second, more...);
+  }
   void count(std::size_t elements) { put(static_cast<std::uint32_t>(elements)); }
 
   const std::string &bytes() const { return bytes_; }
@@ -72,6 +76,11 @@ public:
     at_ += good_ ? length : 0;
   }
 
+  template <typename First, typename Second, typename... More> void get(First &first, Second &second, More &...more) {
+    get(first);
+    get(second, more...);
+  }
+
   bool is_good() const { return good_; }
 
 private:
@@ -87,9 +96,8 @@ double metres(float mm) { return double{mm} / 1000; }
 CdrWriter begun(const Header &header) {
   constexpr std::uint64_t NS_IN_A_S = 1'000'000'000;
   CdrWriter writer;
-  writer.put(static_cast<std::int32_t>(header.time_ns / NS_IN_A_S));
-  writer.put(static_cast<std::uint32_t>(header.time_ns % NS_IN_A_S));
-  writer.put(header.frame_id);
+  writer.put(static_cast<std::int32_t>(header.time_ns / NS_IN_A_S), static_cast<std::uint32_t>(header.time_ns % NS_IN_A_S),
+             header.frame_id);
   return writer;
 }
 
@@ -97,9 +105,7 @@ void skip_header(CdrReader &reader) {
   std::int32_t s;
   std::uint32_t ns;
   std::string frame_id;
-  reader.get(s);
-  reader.get(ns);
-  reader.get(frame_id);
+  reader.get(s, ns, frame_id);
 }
 
 bool is_trusted(std::uint32_t flags) { return (flags & (CONTACT_FLAG_FIT_VALID | warning_flags())) == CONTACT_FLAG_FIT_VALID; }
@@ -113,25 +119,17 @@ struct Vector {
   double x, y, z;
 };
 
-void put(CdrWriter &writer, const Vector &vector) {
-  writer.put(vector.x);
-  writer.put(vector.y);
-  writer.put(vector.z);
-}
+void put(CdrWriter &writer, const Vector &vector) { writer.put(vector.x, vector.y, vector.z); }
 
 std::string status(const Header &header, const std::string &name, const std::string &trouble, const std::string &otherwise,
                    const std::string &serial, const Metadata &values) {
   enum : std::uint8_t { OK, WARN };
   CdrWriter writer = begun(header);
   writer.count(1);
-  writer.put(static_cast<std::uint8_t>(trouble.empty() ? OK : WARN));
-  writer.put(name);
-  writer.put(trouble.empty() ? otherwise : trouble);
-  writer.put(serial);
+  writer.put(static_cast<std::uint8_t>(trouble.empty() ? OK : WARN), name, trouble.empty() ? otherwise : trouble, serial);
   writer.count(values.size());
   for (const auto &[key, value] : values) {
-    writer.put(key);
-    writer.put(value);
+    writer.put(key, value);
   }
   return writer.bytes();
 }
@@ -250,19 +248,11 @@ std::string pressures(const Header &header, const wire_raw &raw, const std::vect
   const std::uint32_t step = SIZE * static_cast<std::uint32_t>(std::size(names));
   const std::uint32_t width = raw.sensor_count;
   CdrWriter writer = begun(header);
-  writer.put(std::uint32_t{1});
-  writer.put(width);
-  writer.count(std::size(names));
+  writer.put(std::uint32_t{1}, width, static_cast<std::uint32_t>(std::size(names)));
   for (std::uint32_t i = 0; i < std::size(names); i++) {
-    writer.put(names[i]);
-    writer.put(i * SIZE);
-    writer.put(FLOAT32);
-    writer.put(std::uint32_t{1});
+    writer.put(names[i], i * SIZE, FLOAT32, std::uint32_t{1});
   }
-  writer.put(false); /* is_bigendian */
-  writer.put(step);
-  writer.put(step * width);
-  writer.count(step * width);
+  writer.put(false /* is_bigendian */, step, step * width, step * width);
   for (std::uint32_t k = 0; k < width; k++) {
     bool valid = raw.valid >> k & 1;
     double pressure_Pa = raw.pressure_Pa_q10[k] / Q10 - raw.baseline_Pa_q10[k] / Q10;
@@ -300,9 +290,7 @@ std::string warnings(const Header &header, const std::string &serial, std::uint3
 
 std::string encode(const Header &header, const Line &line) {
   CdrWriter writer = begun(header);
-  writer.put(line.number);
-  writer.put(line.text);
-  writer.put(line.torn);
+  writer.put(line.number, line.text, line.torn);
   return writer.bytes();
 }
 
@@ -310,9 +298,7 @@ std::optional<Line> decode_line(std::string_view bytes) {
   CdrReader reader(bytes);
   Line line;
   skip_header(reader);
-  reader.get(line.number);
-  reader.get(line.text);
-  reader.get(line.torn);
+  reader.get(line.number, line.text, line.torn);
   return reader.is_good() ? std::optional(line) : std::nullopt;
 }
 
@@ -340,11 +326,7 @@ std::vector<double> locations_mm(std::string_view bytes, std::size_t sensors, st
 
 std::string encode(const Header &header, const Row &row) {
   CdrWriter writer = begun(header);
-  writer.put(row.number);
-  writer.put(row.device);
-  writer.put(row.time_us.value_or(NOT_A_NUMBER));
-  writer.put(row.contact ? row.contact->t_us : row.raw->t_us);
-  writer.put(frame_of(row));
+  writer.put(row.number, row.device, row.time_us.value_or(NOT_A_NUMBER), row.contact ? row.contact->t_us : row.raw->t_us, frame_of(row));
   wire_packet contact = row.contact.value_or(wire_packet{}), raw = row.raw.value_or(wire_packet{});
   CdrPut put_contact{writer, row.contact.has_value()}, put_raw{writer, row.raw.has_value()};
   writer.put(put_contact.is_there);
@@ -369,11 +351,7 @@ std::optional<Row> decode_row(std::string_view bytes) {
   bool has_contact = false, has_raw = false;
   wire_packet contact{}, raw{};
   skip_header(reader);
-  reader.get(row.number);
-  reader.get(row.device);
-  reader.get(time_us);
-  reader.get(t_us);
-  reader.get(frame);
+  reader.get(row.number, row.device, time_us, t_us, frame);
   try {
     reader.get(has_contact);
     CdrGet get_contact{reader, has_contact};

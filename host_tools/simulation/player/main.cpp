@@ -219,7 +219,7 @@ int play(const PlayOptions &options) {
   };
   std::optional<ProgressBar> progress;
   if (!options.quiet) {
-    progress.emplace("playing " + scenario.name(), ProgressBar::Lines::tenths);
+    progress.emplace("playing " + scenario.name());
   }
   const auto end_us = static_cast<std::uint64_t>(1e6 * seconds);
   for (std::uint64_t t_us = begin_us + SLICE_us;; t_us += SLICE_us) {

@@ -121,7 +121,7 @@ int tables(const Options &options) {
     }
   }
   const std::filesystem::path cache = cache_of(options);
-  ProgressBar bar("contact tables", ProgressBar::Lines::tenths);
+  ProgressBar bar("contact tables");
   std::mutex telling;
   const auto make = [&](std::size_t i) {
     const auto report = [&](double share) {
@@ -143,7 +143,7 @@ int tables(const Options &options) {
 }
 
 ContactTable table_of(const std::string &name, const Layer &layer, const Options &options) {
-  ProgressBar bar("contact table of " + name + ", once", ProgressBar::Lines::none);
+  ProgressBar bar("contact table of " + name + ", once");
   return ContactTable::load_or_build(indenter(name), layer, cache_of(options), [&](double share) { show(bar, share); });
 }
 
@@ -180,13 +180,13 @@ int scenario(Options &options) {
   const Scenario made = make_scenario(chosen, table);
   std::optional<BlockTable> block;
   if (chosen.overhang_mm) {
-    ProgressBar bar("table of the pad's edges, once", ProgressBar::Lines::none);
+    ProgressBar bar("table of the pad's edges, once");
     block = BlockTable::load_or_build(block_around(layer, *chosen.overhang_mm), sensor_places(), cache_of(options),
                                       [&](double share) { show(bar, share); });
   }
   Written written;
   {
-    ProgressBar bar(made.name, ProgressBar::Lines::none);
+    ProgressBar bar(made.name);
     written = write_scenario(made, layer, table, block ? &*block : nullptr, options.output, options.overwrite,
                              [&](double share) { show(bar, share); });
   }

@@ -13,6 +13,8 @@ inline constexpr const char *STDOUT_NAME = "-"; /* of a file */
 /* How long a row may wait for earlier ones of other fingertips. */
 constexpr double SETTLE_us = 250e3;
 
+/* A file that grows, whose disk may stall: append waits only while 64 MB are queued. An error is thrown by a later call. */
+std::unique_ptr<ByteSink> make_queued_file(const std::string &path, bool overwrite);
 /* Now, as recordings write it. */
 std::string utc_now();
 

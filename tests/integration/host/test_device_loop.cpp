@@ -42,30 +42,6 @@ TEST(DeviceLoop, AFullFeedHoldsItBackAndDoesNotKeepItFromEnding) {
   EXPECT_LT(held.size(), 10000u);
 }
 
-TEST(DeviceLoop, NothingOfSixteenIsLostWhileADiskStallsForTwoSeconds) {
-  constexpr int PACKETS_per_s = 2 * 1308; /* contact and raw, here all of them contacts */
-  DeviceFeed feed;
-  std::vector<std::unique_ptr<Streamer>> streamers;
-  std::vector<std::unique_ptr<DeviceLoop>> loops;
-  for (std::size_t i = 0; i < 16; i++) {
-    streamers.push_back(std::make_unique<Streamer>(PACKETS_per_s));
-    const Way way = {"", streamers.back()->fingertip.link(), false};
-    loops.push_back(std::make_unique<DeviceLoop>(i, way, streaming(), feed));
-    loops.back()->start();
-  }
-  wait_until(host_now() + milliseconds(2100)); /* no news are taken */
-  std::vector<int> taken(loops.size());
-  for (const auto end = host_now() + milliseconds(400); host_now() < end;) {
-    for (const DeviceNews &news : feed.take(milliseconds(20))) {
-      taken[news.device] += news.kind == Kind::packet;
-    }
-  }
-  for (std::size_t i = 0; i < loops.size(); i++) {
-    EXPECT_EQ(loops[i]->statistics().dropped_packets, 0u) << i;
-    EXPECT_GT(taken[i], 2 * PACKETS_per_s) << i;
-  }
-}
-
 TEST(DeviceLoop, AnErrorEndsItAndIsThrownToWhoAsks) {
   Streamer streamer;
   streamer.fingertip.refuses = true;

@@ -298,7 +298,7 @@ int pad_command(const PadOptions &options) {
   pad_profile profile = typed([&] { return pad::profile_of(shape, info); });
   const bool ends = shape.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm && shape.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm;
   if (ends) {
-    ProgressBar bar("the pad's ends", ProgressBar::Lines::none);
+    ProgressBar bar("the pad's ends");
     profile.edges =
         typed([&] { return pad::edges_of(profile, info, twin::default_cache_directory(), [&](double share) { bar.show(share); }); });
   }

@@ -259,7 +259,7 @@ Json to_json(const Facts &facts, const std::vector<Finding> &findings) {
 int doctor(const DoctorOptions &options) {
   Facts facts;
   {
-    ProgressBar bar("measuring, touch nothing", ProgressBar::Lines::none);
+    ProgressBar bar("measuring, touch nothing");
     facts = gather(options, stop_requested, [&](double share) { bar.show(share); });
   }
   auto &[major, minor, patch] = facts.tool_version;

@@ -101,7 +101,7 @@ std::string fault_of(const Gripper &gripper, const GripperStatus &status) {
 // Until it is done; what lasts too long, or faults, ends in an Error.
 GripperStatus wait_for_end(Gripper &gripper, const char *what, double longest_s, const std::function<bool(const GripperStatus &)> &done,
                            const std::function<double(const GripperStatus &)> &share) {
-  ProgressBar bar(what, ProgressBar::Lines::none);
+  ProgressBar bar(what);
   const auto end = host_now() + std::chrono::milliseconds(static_cast<long>(longest_s * 1000));
   for (;;) {
     const GripperStatus status = polled(gripper);

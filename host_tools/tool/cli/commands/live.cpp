@@ -48,7 +48,7 @@ struct LiveOptions {
 class Live {
 public:
   Live(const LiveOptions &options, const std::vector<Way> &ways)
-      : options_(options), models_(ways.size()), ready_(ways.size()), early_(ways.size()), taring_(ways.size()), accepted_(ways.size()),
+      : options_(options), models_(ways.size()), ready_(ways.size()), taring_(ways.size()), accepted_(ways.size()),
         reported_missing_(ways.size()) {
     DeviceLoop::Options wanted;
     wanted.streams = WIRE_STREAM_ALL;
@@ -126,8 +126,6 @@ private:
       take_answer(news.device, news.packet);
       if (recording_) {
         recording_->packet(news);
-      } else if (ready_[news.device]) {
-        early_[news.device].push_back(std::move(news));
       }
       break;
     case Kind::ready:
@@ -148,7 +146,7 @@ private:
     case Kind::mute: event(news.device, "no answer to the end of the streams"); break;
     case Kind::bytes:
       if (!raw_bytes_) {
-        raw_bytes_ = std::make_unique<OutputFile>(options_.raw_bytes, options_.overwrite, OutputFile::Appears::at_once);
+        raw_bytes_ = make_queued_file(options_.raw_bytes, options_.overwrite);
       }
       raw_bytes_->append(news.bytes.data(), news.bytes.size());
       break;
@@ -179,11 +177,6 @@ private:
     zero_us_ = steady_now_us();
     if (!options_.recording.empty()) {
       recording_.emplace(options_.recording, options_.overwrite, ready, loops_[0]->name(), zero_us_);
-      for (const auto &early : early_) {
-        for (const DeviceNews &news : early) {
-          recording_->packet(news);
-        }
-      }
     }
     begun_ = true;
     for (std::size_t i = 0; i < loops_.size(); i++) {
@@ -332,6 +325,9 @@ private:
     if (recording_) {
       recording_->finish(statistics, reason_);
     }
+    if (raw_bytes_) {
+      raw_bytes_->finish();
+    }
     std::string name = recording_ && !to_standard_output_ ? printable(options_.recording) + ": " : "";
     if (!several()) {
       std::fprintf(options_.monitor ? stdout : stderr, "%s%s\n", name.c_str(), summary_text(models_[0]).c_str());
@@ -363,8 +359,7 @@ private:
   DeviceFeed feed_;
   std::vector<Model> models_;
   std::vector<std::optional<DeviceNews>> ready_;
-  std::vector<std::vector<DeviceNews>> early_; /* packets before all were ready */
-  std::unique_ptr<OutputFile> raw_bytes_;
+  std::unique_ptr<ByteSink> raw_bytes_;
   std::optional<LiveRecording> recording_;
   std::unique_ptr<View> view_;
   std::string note_;

@@ -7,6 +7,7 @@
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/packet_file.hpp"
+#include "libfingertip/progress_bar.hpp"
 #include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
 #include "tool/cli/command_line.hpp"
@@ -36,27 +37,16 @@ struct Conversion {
 
 using Count = unsigned long long;
 
-/* The share of a file that was read, and the time that is left: from the third second on, in place on a terminal, else
- * a line every ten seconds. */
-class Progress {
+/* The share of a file that was read; the place in it is asked for now and then. */
+class Reading {
 public:
-  explicit Progress(const std::string &path) : size_(static_cast<double>(open_bytes(path)->size())) {}
-  ~Progress() { std::fputs(in_place_ && shown_ != begun_ ? "\r\x1b[K" : "", stderr); }
-  Progress(const Progress &) = delete;
-  Progress &operator=(const Progress &) = delete;
+  explicit Reading(const std::string &path) : size_(static_cast<double>(open_bytes(path)->size())), bar_("reading") {}
 
-  /* place: of the file, asked for now and then. */
   template <typename Place> void show(const Place &place) {
     constexpr unsigned AT_ONCE = 4096;
-    const HostTime now = host_now();
-    if (count_++ % AT_ONCE != 0 || now - begun_ < std::chrono::seconds(2) ||
-        now - shown_ < std::chrono::milliseconds(in_place_ ? 200 : 10000)) {
-      return;
+    if (count_++ % AT_ONCE == AT_ONCE - 1) {
+      bar_.show(static_cast<double>(place().offset) / size_);
     }
-    shown_ = now;
-    const double share = static_cast<double>(place().offset) / size_;
-    const double left_s = std::chrono::duration<double>(now - begun_).count() * (1 / std::max(share, 1e-3) - 1);
-    std::fprintf(stderr, in_place_ ? "\r\x1b[K%.0f %%, %.0f s left" : "%.0f %%, %.0f s left\n", 100 * share, left_s);
   }
   void show(PacketFile &file) {
     show([&] {
@@ -67,9 +57,8 @@ public:
 
 private:
   double size_;
-  bool in_place_ = isatty(STDERR_FILENO);
   unsigned count_ = 0;
-  HostTime begun_ = host_now(), shown_ = begun_;
+  ProgressBar bar_;
 };
 
 /* That a recording has a place for. */
@@ -96,9 +85,9 @@ struct Contents {
 Contents contents_of(const Conversion &conversion) {
   PacketFile file(conversion.from, conversion.salvage, conversion.device, conversion.interval);
   Contents contents;
-  Progress progress(conversion.from);
+  Reading reading(conversion.from);
   while (auto item = file.next()) {
-    progress.show(file);
+    reading.show(file);
     if (item->kind != PacketFile::Item::Kind::packet || item->made) {
       if (item->made && !contents.info) {
         contents.info = item->packet.body.info;
@@ -135,6 +124,14 @@ void report_losses(const std::string &path, const PacketFile &file) {
   report_cut_short(path, file.is_cut_short());
 }
 
+std::unique_ptr<LineSink> sink_of(const Conversion &conversion) {
+  auto sink = make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished);
+  if (conversion.every_row) {
+    sink->repeat_every_row();
+  }
+  return sink;
+}
+
 /* To a recording of one fingertip, packet by packet, with counts of its own in the end line. Throws Error. */
 void convert_packets(const Conversion &conversion) {
   Contents contents = contents_of(conversion);
@@ -145,14 +142,13 @@ void convert_packets(const Conversion &conversion) {
       metadata.emplace_back(key, value);
     }
   }
-  RecordingWriter writer(make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished),
-                         contents.info ? &*contents.info : nullptr,
+  RecordingWriter writer(sink_of(conversion), contents.info ? &*contents.info : nullptr,
                          contents.sensor_count.value_or(contents.info ? contents.info->sensor_count : std::uint8_t{0}), metadata,
                          contents.sensor_count.has_value());
   PacketFile file(conversion.from, conversion.salvage, conversion.device, conversion.interval);
-  Progress progress(conversion.from);
+  Reading reading(conversion.from);
   while (auto item = file.next()) {
-    progress.show(file);
+    reading.show(file);
     if (item->kind == PacketFile::Item::Kind::packet && !item->made) {
       writer.packet(item->packet);
     } else if (item->kind == PacketFile::Item::Kind::event) {
@@ -173,12 +169,9 @@ void convert_packets(const Conversion &conversion) {
 void convert_lines(const Conversion &conversion) {
   RecordingReader(conversion.from, true); /* throws for what is none */
   auto source = within(open_lines(conversion.from), conversion.interval);
-  auto sink = make_lines(conversion.to, conversion.overwrite, OutputFile::Appears::when_finished);
-  if (conversion.every_row) {
-    sink->repeat_every_row();
-  }
+  auto sink = sink_of(conversion);
   LineSource::Line line;
-  Progress progress(conversion.from);
+  Reading reading(conversion.from);
   std::uint64_t last = 0, count = 0, rows = 0; /* and the header */
   bool is_ended = false;
   const auto report_damage = [&](const std::string &what, const std::string &place = "") {
@@ -205,7 +198,7 @@ void convert_lines(const Conversion &conversion) {
     last = line.number;
     count++;
     rows += !line.text.empty() && line.text[0] != '#';
-    progress.show([&] { return source->place(); });
+    reading.show([&] { return source->place(); });
     is_ended = is_ended || (!line.torn && line.text.rfind("# end:", 0) == 0);
     if (line.torn) {
       report_damage("the last line is torn", ":" + std::to_string(line.number));
@@ -248,6 +241,9 @@ int convert(const Conversion &conversion) {
   const bool to_capture = end == ".ftr";
   if (!to_capture && end != ".csv" && !is_mcap_name(conversion.to)) {
     throw WrongUsage("\"" + printable(conversion.to) + "\" must end with .csv, .mcap or .ftr, which selects the format");
+  }
+  if (conversion.every_row && !is_mcap_name(conversion.to)) {
+    throw WrongUsage("--every-row is for MCAP files; leave it out, or let OUT end with .mcap");
   }
   check_paths(conversion);
   if (to_capture) {
