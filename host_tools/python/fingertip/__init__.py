@@ -1,7 +1,7 @@
 """Reads and commands fingertips: fifteen barometers under rubber that measure where they are touched, how hard, and whether it slips.
 
-from fingertip import Fingertip with Fingertip() as fingertip:
-    for frame in fingertip:
+with fingertip.Fingertip() as tip:
+    for frame in tip:
         if frame.trusted:
             print(frame.x_mm, frame.y_mm, frame.force_N)
 """

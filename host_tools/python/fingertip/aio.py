@@ -3,14 +3,29 @@
 import asyncio
 import contextlib
 import functools
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable, Coroutine
 from types import TracebackType
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from .device import Fingertip
 from .errors import GoneError, NoFrameError
 from .frames import Block, Frame
-from .wire import Health, Info
+from .wire import Info
+
+Parameters = ParamSpec("Parameters")
+Answer = TypeVar("Answer")
+
+
+def _waiting(
+    method: Callable[Concatenate[Fingertip, Parameters], Answer],
+) -> Callable[Concatenate["AsyncFingertip", Parameters], Coroutine[Any, Any, Answer]]:
+    """The same in a thread."""
+
+    @functools.wraps(method)
+    async def wait(self: "AsyncFingertip", /, *arguments: Parameters.args, **options: Parameters.kwargs) -> Answer:
+        return await asyncio.to_thread(method, self.sync, *arguments, **options)
+
+    return wait
 
 
 class AsyncFingertip:
@@ -20,7 +35,7 @@ class AsyncFingertip:
             async for frame in fingertip:
                 ...
 
-    sync is the Fingertip itself, whose latest(), info, health, statistics, clock and record return at once.
+    sync is the Fingertip itself, whose health, statistics and clock are there at once.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -33,6 +48,10 @@ class AsyncFingertip:
         if self._sync is None:
             raise GoneError("not open; use async with")
         return self._sync
+
+    @property
+    def info(self) -> Info:
+        return self.sync.info
 
     async def __aenter__(self) -> "AsyncFingertip":
         loop = asyncio.get_running_loop()
@@ -64,18 +83,16 @@ class AsyncFingertip:
                     if not self.sync.is_returning:
                         raise NoFrameError(f"{self.sync.description}: no frame in {patience_s:g} s") from None
 
-    async def tare(self, force: bool = False) -> None:
-        """This and the following as Fingertip has them."""
-        await asyncio.to_thread(self.sync.tare, force)
+    tare = _waiting(Fingertip.tare)
+    set = _waiting(Fingertip.set)
+    set_streams = _waiting(Fingertip.set_streams)
+    latest = _waiting(Fingertip.latest)
+    read_info = _waiting(Fingertip.read_info)
+    read_health = _waiting(Fingertip.read_health)
+    read_crash = _waiting(Fingertip.read_crash)
+    read_block = _waiting(Fingertip.read_block)
+    record = _waiting(Fingertip.record)
 
-    async def set(self, **settings: Any) -> Info:
-        return await asyncio.to_thread(self.sync.set, **settings)
-
-    async def read_info(self) -> Info:
-        return await asyncio.to_thread(self.sync.read_info)
-
-    async def read_health(self) -> Health:
-        return await asyncio.to_thread(self.sync.read_health)
-
-    async def read_block(self, frames: int | None = None, seconds: float | None = None) -> Block:
-        return await asyncio.to_thread(self.sync.read_block, frames, seconds)
+    async def blocks(self, frames: int) -> AsyncIterator[Block]:
+        while len(block := await self.read_block(frames)):
+            yield block

@@ -1,11 +1,7 @@
 """The files of the Fingertip tools: scenarios, recordings, run reports. One reader for each.
 
-Scenario (CSV, UTF-8): what the sensors feel.
-    # fingertip-scenario 1
-    # key: value              name, description, ambient_Pa, temperature_degC, sensors
-    t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa[,Qx_N,Qy_N][,temperature_degC]
-One row each millisecond, t_s strictly increasing from 0 = power-on; linear between rows. s<k>_Pa is the pressure
-above ambient on sensor k. contact .. slip are the truth, and so is the tangential force Qx_N, Qy_N; without, there is none.
+Scenario (CSV, UTF-8): what the sensors measure over time, and the truth behind it: see host_tools/simulation/emulator/scenario.mjs. Without Qx_N
+and Qy_N there is no tangential force.
 
 Recording (CSV or MCAP): the packets of one fingertip or of several, one row per frame: see
 host_tools/library/libfingertip/RECORDING.md. Cells of a packet that did not come are empty, and those of a quantity whose flag is off (no
@@ -256,6 +252,9 @@ class Recording:
 
     def __getitem__(self, name: str) -> Array:
         return self.columns[name]
+
+    def __repr__(self) -> str:
+        return f"<Recording {self.path}: {len(self.line_numbers)} frames, ended: {self.end.get('reason', 'cut short')}>"
 
     @property
     def has_contact(self) -> npt.NDArray[np.bool_]:

@@ -219,7 +219,8 @@ def main(argv: list[str]) -> int:
             print(f"domain {publisher.domain}: {' '.join(names)}", flush=True)
             publish(publisher, fingertips, lambda: stop.is_set() or host_time.now_s() >= end_s)
             for serial, tip in fingertips.by_serial.items():
-                print(f"{serial}: lost {tip.statistics.dropped_packets + tip.overrun_frames}")
+                frames = publisher.sent[f"/fingertip/{name_in_ros(serial)}/contact"]
+                print(f"{serial}: {frames} frames, lost {tip.statistics.dropped_packets + tip.overrun_frames}")
             print("".join(f"{name}: {count} messages\n" for name, count in publisher.sent.items()) + f"refused: {publisher.refused}")
     except FingertipError as error:
         raise InputError(str(error)) from None

@@ -59,7 +59,7 @@ class Streaming(DeviceTest):
             async with fingertip.AsyncFingertip(self.port, timeout_s=PATIENCE_s) as tip:
                 await tip.set(osr=512)
                 await tip.tare()
-                self.assertEqual((await tip.read_info()).osr, 512)
+                self.assertEqual([(await tip.read_info()).osr, tip.info.osr], [512, 512])
                 self.assertEqual((await tip.read_health()).capabilities & 1, 1)
                 numbers = []
                 async for frame in tip:
@@ -68,6 +68,10 @@ class Streaming(DeviceTest):
                         break
                 self.assertEqual(numbers, list(range(numbers[0], numbers[0] + 60)))
                 self.assertEqual(len(await tip.read_block(10)), 10)
+                with await tip.record(self.csv) as writer:
+                    self.assertEqual(len(await anext(tip.blocks(20))), 20)
+                    self.assertGreater((await tip.latest()).frame, numbers[-1])
+                self.assertGreaterEqual(writer.frames, 20)
 
         async def gone():
             async with fingertip.AsyncFingertip(self.port, timeout_s=PATIENCE_s) as tip:

@@ -135,7 +135,7 @@ class Command(unittest.TestCase):
             command.send_signal(signal.SIGINT)
             out, error = command.communicate(timeout=PATIENCE_s)
         self.assertEqual((command.returncode, error), (0, ""))
-        self.assertRegex(out, rf"(?m)^/fingertip/{SERIAL}/wrench: \d+ messages$")
+        self.assertRegex(out, rf"(?ms)^{SERIAL}: \d+ frames, lost \d+$.*^/fingertip/{SERIAL}/wrench: \d+ messages$")
         said = [decode("diagnostic_msgs/DiagnosticArray", data)["status"][0] for data in ears.close()["/diagnostics"]]
         self.assertEqual(
             [(each["level"], each["message"]) for each in said if each["name"].endswith("line")],
