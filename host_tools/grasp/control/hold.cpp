@@ -32,7 +32,6 @@ constexpr double FALLS_s = 0.06;
 constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
 // Friction falls by less than this factor as a slide begins.
 constexpr double GROWN = 1.4;
-constexpr double MORE = 1.3; // factor on the grip of an object that slides without a known load
 
 static double late_s(double delay_s) { return std::clamp(delay_s - SOON_s, 0.0, LATEST_s); }
 
@@ -140,7 +139,7 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
   const double least_N = !has_seen_load_ && !readings.has_load ? blind_N : was_loaded_ ? settings.floor_N + late_N : settings.first_N();
   double need = std::max(need_N(settings, readings.delay_s, dead_s), least_N);
   if (goes_on_ && !readings.has_load) {
-    need = std::max(need, MORE * readings.grip_N);
+    need = std::max(need, GROWN * settings.margin * readings.grip_N);
   }
   need = std::min(need, settings.cap_N);
   is_set_ = settings.sets_force() && need == least_N && !is_loaded() && slides_ == 0;

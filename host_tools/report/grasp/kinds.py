@@ -45,6 +45,7 @@ GOALS = tuple(
     ("first_grip_over_2x_percent", "<=", 0.5),
     ("first_grip_below_wanted_half_percent", "<=", 0),
     ("late_40ms_drops_percent", "<=", 3),
+    ("friction_below_0.6_of_true_percent", "<=", 5),
     ("step_us", "<=", 20),
     ("limit_cycles", "<=", 0),
     ("one_bad_frame_squeezed", "<=", 0),
@@ -79,7 +80,7 @@ USUAL, USUAL_MORE = 150, 40
 FIRM_N = 8.0
 NEED_LEAST_N = 1.5  # of a catch that counts
 FIRST_MUCH = 2.0
-TURNED_deg = 30
+TURNED_deg, LEARNT = 30, 0.6
 
 
 def found_by(build, *more):
@@ -99,6 +100,7 @@ def percent(part, whole):
 
 def summary(each):
     held = [one for one in each if not one["dropped"] and not one["never_held"]]
+    slid = [one for one in held if one["slides"] and one["shape"] in BY_SHAPE["ball"][0]]
     need = [
         slide["peak_N"] / slide["least_N"]
         for one in each
@@ -123,6 +125,7 @@ def summary(each):
         "first_grip_over_2x_percent": percent(sum(one["first_N"] > FIRST_MUCH * one["start_N"] for one in each), len(each)),
         "first_grip_below_wanted_half_percent": percent(sum(one["first_N"] < 0.5 * one["start_N"] for one in each), len(each)),
         "turned_unreported_percent": percent(sum(one["turned_deg"] > TURNED_deg and one["slides"] == 0 for one in held), len(held)),
+        "friction_below_0.6_of_true_percent": percent(sum(one["learnt"] < LEARNT for one in slid), len(slid)),
         "step_us": quantile([one["step_us"] for one in each], 0.5),
     }
 
@@ -203,6 +206,7 @@ def figures(rows, sets, shapes, wrong):
         "first_grip_below_wanted_half_percent": worst(rows, "first_grip_below_wanted_half_percent", "usual and rough"),
         "late_40ms_drops_percent": worst(rows, "drops_percent", "usual and rough, 40 ms later"),
         "turned_unreported_percent": worst(rows, "turned_unreported_percent", "usual and rough"),
+        "friction_below_0.6_of_true_percent": worst(rows, "friction_below_0.6_of_true_percent", "usual and rough"),
         "step_us": worst(rows, "step_us"),
         "limit_cycles": sum(row["limit_cycles"] for row in sets if row["row"] in ("60 s", "12 s, eq. (5) and (6)")),
         "one_bad_frame_squeezed": sum(row["squeezed"] for row in wrong if row["wrong"] in WRONG_SHORT),

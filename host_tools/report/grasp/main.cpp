@@ -132,6 +132,7 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
                     {"margin", o.margin},
                     {"slid_mm", o.slid_mm},
                     {"slides", o.slides},
+                    {"learnt", o.friction},
                     {"turned_deg", o.turned_deg},
                     {"first_N", o.first_N},
                     {"peak_N", o.peak_N},

@@ -163,12 +163,11 @@ EmulatedTrial trial_of() {
   return trial;
 }
 
-// In microseconds over what a unit has of them.
-ordered_json rounded(double s, double per_unit) {
+// To a microsecond.
+ordered_json to_us(double s, double per_unit = 1e6) {
   return std::isfinite(s) ? ordered_json(std::round(1e6 * s) / per_unit) : ordered_json(nullptr);
 }
-ordered_json in_ms(double s) { return rounded(s, 1e3); }
-ordered_json to_us(double s) { return rounded(s, 1e6); }
+ordered_json in_ms(double s) { return to_us(s, 1e3); }
 
 class EmulatedGrasp {
 public:
@@ -362,14 +361,15 @@ private:
   std::vector<Change> commanded_, asked_, moved_;
 };
 
-// Reads from the standard input; false: it has ended.
-bool read_whole(void *to, std::size_t length) { return std::fread(to, 1, length, stdin) == length; }
+void read_whole(void *to, std::size_t length) {
+  if (std::fread(to, 1, length, stdin) != length) {
+    throw std::runtime_error("the boards have ended");
+  }
+}
 
 template <typename Value> Value next() {
   Value value;
-  if (!read_whole(&value, sizeof value)) {
-    throw std::runtime_error("the boards have ended");
-  }
+  read_whole(&value, sizeof value);
   return value;
 }
 
@@ -400,9 +400,7 @@ int serve(const std::string &cache) {
         throw std::runtime_error("two boards are needed");
       }
       bytes.resize(length);
-      if (!read_whole(bytes.data(), length)) {
-        throw std::runtime_error("the boards have ended");
-      }
+      read_whole(bytes.data(), length);
       grasp.take(board, bytes, at_s);
     }
     const std::array<Bytes, 2> sent{grasp.to_send(0), grasp.to_send(1)};

@@ -17,6 +17,7 @@
 namespace fingertip::cell {
 
 constexpr std::size_t SENSORS = 15;
+constexpr double AIR_Pa = 101325.0;
 using Pressures = std::array<double, SENSORS>; // Pa, on the base
 
 // Its place is the centre of pressure, its angle that of its length.

@@ -29,7 +29,6 @@ namespace {
 
 enum Stream : std::uint64_t { CALIBRATION = 841 };
 
-constexpr double AIR_Pa = 101325.0;
 constexpr float FORCE_SCALE_SD = 0.02F; // of a calibration by a weight
 constexpr std::uint64_t COMMAND_us = 100'000, SETTLED_us = 1'500'000;
 constexpr std::chrono::milliseconds ROUND{1};

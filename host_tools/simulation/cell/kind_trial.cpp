@@ -396,6 +396,7 @@ private:
   KindOutcome outcome() {
     outcome_.step_us = stepping_us_ / std::max(steps_, 1.0);
     outcome_.slides = report_.slides;
+    outcome_.friction = 2.0 * report_.friction / (cell_.friction(0) + cell_.friction(1));
     outcome_.slid_mm = cell_.slid_mm();
     outcome_.crushed = outcome_.peak_N > grasp_.crushes_N;
     outcome_.catches = slips_.slips;

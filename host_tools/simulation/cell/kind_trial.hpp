@@ -86,6 +86,7 @@ struct KindOutcome {
   double first_N = 0.0;      // the largest force before the lift
   double turned_deg = 0.0;   // about the grip's axis, the most since the lift
   double margin = 0.0;       // median of force over least force, from the lift's end on
+  double friction = 0.0;     // what the controller learnt at the end, of the true one
   std::uint32_t slides = 0;  // that the controller counted
   std::vector<Slip> catches; // slides that ended before the object was lost
   // Only of a still trial.

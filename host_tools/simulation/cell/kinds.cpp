@@ -174,23 +174,20 @@ const char *name_of(Kind kind) {
 
 const char *name_of(Shape shape) { return STIFFER[static_cast<int>(shape)].name; }
 
-Shape shape_of(const std::string &name) {
-  if (const Shape *found = find_in(SHAPES, [&](Shape shape) { return name == name_of(shape); })) {
+template <typename All> static auto one_of(const All &all, const char *what, const std::string &name) {
+  if (const auto *found = find_in(all, [&](auto one) { return name == name_of(one); })) {
     return *found;
   }
-  throw std::runtime_error("there is no shape \"" + name + "\"; choose one of: ball egg box plate upright lying cup");
+  const auto text_of = [](auto one) { return name_of(one); };
+  throw std::runtime_error(std::string("there is no ") + what + " \"" + name + "\"; choose one of: " + joined(all, " ", text_of));
 }
+
+Shape shape_of(const std::string &name) { return one_of(SHAPES, "shape", name); }
+Kind kind_of(const std::string &name) { return one_of(KINDS, "kind", name); }
 
 const char *name_of(Event::Kind kind) {
   constexpr const char *NAMES[] = {"knock", "push", "vibrate", "pour", "carry", "slick", "jerk", "lower"};
   return NAMES[static_cast<int>(kind)];
-}
-
-Kind kind_of(const std::string &name) {
-  if (const Kind *found = find_in(KINDS, [&](Kind kind) { return name == name_of(kind); })) {
-    return *found;
-  }
-  throw std::runtime_error("there is no kind \"" + name + "\"; choose one of: gentle usual rough slick fragile");
 }
 
 KindOfGrasp::Inputs KindOfGrasp::inputs(double t_s) const {

@@ -4,6 +4,7 @@
 #include "libfingertip/error.hpp"
 #include "libfingertip/random.hpp"
 #include "libfingertip/session.hpp"
+#include "libfingertip/text.hpp"
 #include "simulation/cell/hand_server.hpp"
 #include "simulation/twin/effects.hpp"
 
@@ -17,7 +18,7 @@ namespace {
 
 enum Stream : std::uint64_t { PLACES = 862 };
 
-constexpr double GRAVITY_m_s2 = 9.80665, AIR_Pa = 101325.0;
+constexpr double GRAVITY_m_s2 = 9.80665;
 constexpr std::chrono::milliseconds ROUND{1};
 constexpr std::int64_t ROUND_us = 1'000;
 // The twin's placements (twin/episodes.hpp). Each lasts long enough for a calibration to take it.
@@ -26,9 +27,6 @@ constexpr double RESTS_s = 1.2, SETS_DOWN_s = 0.15, HOLDS_s = 1.5;
 constexpr double FOLLOWS_s = 0.012; // time constant of the ball after the hand
 constexpr double LIFTED_N = 0.005;
 constexpr double PERIOD_s = RESTS_s + SETS_DOWN_s + HOLDS_s + SETS_DOWN_s;
-
-// 0 to 1 within 0 to 1, smooth at both ends.
-double smooth(double share) { return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0)); }
 
 // The van der Corput sequence, 0 to 1: evenly spread for any count.
 double spread(std::uint64_t number, unsigned base) {
@@ -85,13 +83,8 @@ public:
   }
   // x_mm, y_mm, force_N; places only while it touches.
   std::string cells() const {
-    std::ostringstream text;
-    if (touch_.force_N > 0.0) {
-      text << touch_.x_mm << "," << touch_.y_mm << "," << touch_.force_N;
-    } else {
-      text << ",,0";
-    }
-    return text.str();
+    const std::array values = {touch_.x_mm, touch_.y_mm, touch_.force_N};
+    return touch_.force_N > 0.0 ? joined(values, ",", [](double value) { return fixed(value, 5); }) : ",,0";
   }
 
 private:

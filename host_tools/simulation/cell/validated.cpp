@@ -18,7 +18,6 @@ namespace {
 
 enum Stream : std::uint64_t { FAULT = 871, HAND = 872, SHEET = 873 };
 
-constexpr double AIR_Pa = 101325.0;
 constexpr double THIN_mm = 8.0, TILT_SHARE = 0.09, LOOSE_SD = 0.2;
 constexpr double DRIFT_MIN_Pa_min = 60.0, DRIFT_MAX_Pa_min = 180.0;
 constexpr std::size_t DRIFTING = 3;
@@ -56,9 +55,9 @@ std::vector<Mark> template_marks() {
 
 std::string text_of(double value) { return shortest(static_cast<float>(value)); }
 
-double smooth(double share) { return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0)); }
-
 } // namespace
+
+double smooth(double share) { return 0.5 - 0.5 * std::cos(M_PI * std::clamp(share, 0.0, 1.0)); }
 
 twin::EffectValues usual_effects() { return twin::parse_effects("gain,memory,aftereffect,drift,places,dip,widths"); }
 

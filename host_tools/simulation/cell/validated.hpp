@@ -26,6 +26,8 @@ enum class PadFault {
 };
 const std::vector<std::string> &pad_fault_names(); // in this order
 
+double smooth(double share); // 0 to 1 within 0 to 1, smooth at both ends
+
 // As the recordings of real strips and grids have them (twin/README.md, effects).
 twin::EffectValues usual_effects();
 

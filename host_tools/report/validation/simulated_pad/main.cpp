@@ -25,7 +25,6 @@ extern "C" {
 namespace fingertip::cell {
 namespace {
 
-constexpr double AIR_Pa = 101325.0;
 constexpr std::uint32_t DATE_s = 1767225600;
 constexpr std::uint64_t SLICE_us = 5'000, COMMAND_us = 100'000;
 constexpr std::size_t PLACEMENTS = 20; // of a calibration
