@@ -97,11 +97,9 @@ def many(build):
             ports = [programs.fake_device(f"{i:04X}", f"rate={RATE_Hz}") for i in range(count)]
             file, pipe = programs.folder / name, programs.folder / f"pipe_{name}"
             os.mkfifo(pipe)
-            reads = f"(head -c {count * stalls_at}; sleep {2 * bool(stalls_at)}; cat) < {pipe} > {file}"
-            disk = programs.start("sh", "-c", reads)
+            disk = programs.start("sh", "-c", f"(head -c {count * stalls_at}; sleep {2 * bool(stalls_at)}; cat) < {pipe} > {file}")
             environment = programs.environment | {"FINGERTIP_PORT": ":".join(map(str, ports))}
-            words = ("record", pipe, "--all", "--overwrite", "--seconds", MANY_s)
-            run(build / "host_tools/tool/cli/fingertip", *words, env=environment)
+            run(build / "host_tools/tool/cli/fingertip", "record", pipe, "--all", "--overwrite", "--seconds", MANY_s, env=environment)
             disk.wait()
             ends = [read_recording(file, serial=f"{i:04X}" if count > 1 else None, columns=("t_us", "frame")).end for i in range(count)]
             figure = "stall_2s_lost" if stalls_at else f"record{count}_lost"

@@ -17,7 +17,6 @@ from nightly import ROOT, job, run
 from fingertip.files import InputError
 
 WHOLE, QUICK = 2, 6  # runs; half of them on a busy machine
-LONGEST = 15  # tests that are listed
 # Both end with this process, which is their first argument.
 BURN = "import os, sys\nwhile os.getppid() == int(sys.argv[1]):\n    sum(range(1000000))\n"
 WRITE = """
@@ -105,10 +104,8 @@ def runs(build):
         "whole_tests": len(times),
         "whole_test_seconds": sum(times.values()),
         "whole_minutes": max(seconds / 60 for busy, seconds, _ in whole if not busy),
-        "whole_minutes_busy": max(seconds / 60 for busy, seconds, _ in whole if busy),
         "quick_seconds": max(seconds for busy, seconds, _ in quick if not busy),
         "skipped": with_status(whole, "skipped"),
-        "longest": dict(sorted(times.items(), key=lambda item: -item[1])[:LONGEST]),
         "sleeps": sum(what == "sleep" for _, _, what in waiting),
         "retries": sum(what == "retry" for _, _, what in waiting),
     }

@@ -28,7 +28,6 @@ class Recording(CliTest):
         self.assertRegex(comments[-1], r"^# end: reason=seconds frames=\d+ .* dropped_packets=0 .*crc_errors=0")
         self.assertEqual([int(row["frame"]) for row in rows], list(range(1, len(rows) + 1)))
         self.assertTrue(all(row["x_mm"] and row["s14_Pa"] and row["tare0_Pa"] for row in rows[:-1]))
-        # the captured bytes hold the same frames
         converted = os.path.join(self.folder, "c.csv")
         self.run_cli("convert", self.ftr, converted)
         again, _ = self.rows(converted)

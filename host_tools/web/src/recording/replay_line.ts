@@ -178,6 +178,11 @@ export class Replay {
     this.stopped = true;
   }
 
+  /** What lies between comes at once. */
+  skip(seconds: number): void {
+    this.now_us += seconds * 1e6;
+  }
+
   get holdsSeveral(): boolean {
     return this.lines.length > 1;
   }
@@ -219,7 +224,7 @@ export class Replay {
         const { time_us } = this.next;
         if (!Number.isNaN(time_us)) {
           // The first, or a fingertip that restarted while it was recorded.
-          if (Number.isNaN(this.now_us) || time_us < this.now_us - 1e6) {
+          if (Number.isNaN(this.now_us) || time_us < this.first_us + (this.seconds - 1) * 1e6) {
             this.first_us = time_us - this.seconds * 1e6;
             this.now_us = time_us;
           }

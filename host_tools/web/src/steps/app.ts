@@ -105,9 +105,11 @@ export class App {
     this.changed();
   }
 
-  pauseReplay(replay: Replay, paused: boolean): void {
-    replay.paused = paused;
-    this.changed();
+  changeReplay(replay: Replay | undefined, change: Partial<Pick<Replay, 'paused' | 'speed'>>): void {
+    if (replay) {
+      Object.assign(replay, change);
+      this.changed();
+    }
   }
 
   /** Closes it and takes it off the page. */

@@ -10,6 +10,8 @@ import { record } from './record';
 import { settings } from './settings';
 import { tare } from './tare';
 
+const SPEEDS = [0.25, 0.5, 1, 2, 5, 20];
+
 /** "Connect", "Simulate", "Replay a file"; files may also be dropped on the page. */
 export function pageControls(app: App): HTMLElement {
   const input = element('input', { type: 'file', accept: '.csv,.mcap,.ftr', hidden: true, 'aria-label': 'Recording to replay' });
@@ -46,12 +48,10 @@ export function fingertipControls(app: App, fingertip: Fingertip): HTMLElement {
   const stop_button = button('Stop', () => void app.stopRecording(fingertip));
   const doctor_button = button('Doctor', () => examine(fingertip));
   const flash_button = button('Flash', () => flash(app, fingertip));
-  const pause_button = button('Pause', () => {
-    const replay = app.replays.get(fingertip);
-    if (replay) {
-      app.pauseReplay(replay, !replay.paused);
-    }
-  });
+  const pause_button = button('Pause', () => app.changeReplay(app.replays.get(fingertip), { paused: !app.replays.get(fingertip)?.paused }));
+  const skip_button = button('10 s ahead', () => app.replays.get(fingertip)?.skip(10));
+  const speed = element('select', { 'aria-label': 'Speed' }, ...SPEEDS.map((times) => element('option', { value: times }, `${times}×`)));
+  speed.addEventListener('change', () => app.changeReplay(app.replays.get(fingertip), { speed: Number(speed.value) }));
   const leave_button = button('Disconnect', () => void app.disconnect(fingertip));
 
   const controls = element(
@@ -63,6 +63,8 @@ export function fingertipControls(app: App, fingertip: Fingertip): HTMLElement {
     record_button,
     stop_button,
     pause_button,
+    speed,
+    skip_button,
     doctor_button,
     flash_button,
     leave_button,
@@ -82,8 +84,11 @@ export function fingertipControls(app: App, fingertip: Fingertip): HTMLElement {
     record_button.disabled = !live;
     stop_button.hidden = !recording;
     flash_button.hidden = is_replay || app.portOf(fingertip) === null;
-    pause_button.hidden = !replay;
-    pause_button.disabled = state === 'closed';
+    for (const control of [pause_button, speed, skip_button]) {
+      control.hidden = !replay;
+      control.disabled = state === 'closed';
+    }
+    speed.value = String(replay?.speed ?? 1);
     pause_button.textContent = replay?.paused ? 'Go on' : 'Pause';
     leave_button.textContent = is_replay ? 'Close' : 'Disconnect';
   };

@@ -36,6 +36,8 @@ interface Bench {
 const TRACES_INTERVAL_ms = 33;
 const TEXT_INTERVAL_ms = 125;
 const HEALTH_INTERVAL_ms = 500;
+const NOTICE_ms = 20000;
+const NOTICES_MOST = 3;
 
 export class View {
   /** Pictures drawn so far. */
@@ -127,6 +129,8 @@ export class View {
     const notice = element('div', { class: `notice ${level}` }, element('p', {}, text));
     notice.append(button('Close', () => notice.remove(), { class: 'small' }));
     this.notices.append(notice);
+    [...this.notices.children].slice(0, -NOTICES_MOST).forEach((each) => each.remove());
+    setTimeout(() => level === 'plain' && notice.remove(), NOTICE_ms);
   }
 
   private gather(): void {
