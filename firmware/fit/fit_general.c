@@ -51,6 +51,7 @@ struct parameters {
 /* What cast rubber takes from the Gaussian e: share exp(-(X^2 + Y^2) / (2 sd^2)), of the same amplitude. */
 struct dip {
   float share, log2_scale, narrowness; /* log2(e) / (2 sd^2), 1 / sd^2 */
+  const struct fit_array *array;
 };
 
 /* One more row weight (sigma - prior) of the least squares, pitches; weight 0: none. */
@@ -175,12 +176,14 @@ static struct parameters guess(const struct samples *samples, int peak) {
   return theta;
 }
 
-/* At X, Y from the centre: the model of amplitude 1 is e - d, with e = exp(-(X^2 + Y^2) / (2 sigma^2)) and d that of
+/* At a place, X, Y from the centre: the model of amplitude 1 is e - d, with e = exp(-(X^2 + Y^2) / (2 sigma^2)) and d that of
  * the dip. The row is what its derivatives span, e (1, X, Y, X^2 + Y^2) where there is no dip. Returns d. */
-static float model_row(const struct dip *dip, float sigma, float x, float y, float row[PARAMETERS]) {
-  float r2 = x * x + y * y, sigma2 = sigma * sigma;
+static float model_row(const struct dip *dip, const struct parameters *at, float place_x, float place_y, float row[PARAMETERS]) {
+  float x = place_x - at->x, y = place_y - at->y;
+  float r2 = x * x + y * y, sigma2 = at->sigma * at->sigma;
   float e = fit_exp2_negative(r2 * (0.5f * LOG2_E / sigma2));
   float d = dip->share > 0.0f ? dip->share * fit_exp2_negative(r2 * dip->log2_scale) : 0.0f;
+  d *= fit_dip_there(dip->array, at->sigma, at->x, at->y, place_x, place_y);
   float slope = e - sigma2 * dip->narrowness * d;
   row[0] = e - d;
   row[1] = slope * x;
@@ -198,7 +201,7 @@ static float linearise(const struct fit_array *array, const struct samples *samp
   float numerator = 0.0f;
   float denominator = 1e-30f;
   for (int k = 0; k < samples->count; k++) {
-    model_row(dip, theta->sigma, samples->x[k] - theta->x, samples->y[k] - theta->y, row[k]);
+    model_row(dip, theta, samples->x[k], samples->y[k], row[k]);
     numerator += row[k][0] * samples->p[k];
     denominator += row[k][0] * row[k][0];
   }
@@ -270,7 +273,7 @@ static int outlier_of(const struct samples *samples, const struct dip *dip, cons
   int outlier = -1;
   for (int k = 0; k < samples->count; k++) {
     float row[PARAMETERS];
-    model_row(dip, theta->sigma, samples->x[k] - theta->x, samples->y[k] - theta->y, row);
+    model_row(dip, theta, samples->x[k], samples->y[k], row);
     float residual = samples->p[k] - theta->p0 * row[0];
     float free = 1.0f - inverse_form(normal, row); /* of the leverage */
     float without = residual * residual / (free > LEAST_FREE ? free : LEAST_FREE);
@@ -348,7 +351,7 @@ static void add_own_errors(const struct samples *samples, const struct fit_setti
     float x = samples->x[k] - at->x, y = samples->y[k] - at->y;
     float r2 = x * x + y * y;
     float row[PARAMETERS];
-    float d = model_row(dip, at->sigma, x, y, row), e = row[0] + d;
+    float d = model_row(dip, at, samples->x[k], samples->y[k], row), e = row[0] + d;
     float by_x = product(row, influence->x), by_y = product(row, influence->y);
     float by_force = product(row, influence->force);
     float gain_sd = (float)settings->gain_sd_q16[samples->sensor[k]] * (1.0f / 65536.0f);
@@ -448,7 +451,7 @@ static void set_known(struct problem *problem) {
     problem->prior.sigma = settings->prior_sigma_mm / pitch_mm;
     problem->prior.weight = FIT_PRIOR_WEIGHT * pitch_mm / settings->prior_width_mm;
   }
-  problem->dip = (struct dip){0.0f, 0.0f, 0.0f};
+  problem->dip = (struct dip){0.0f, 0.0f, 0.0f, problem->array};
   if (fit_has_dip(settings)) {
     float sd = clamp(settings->dip_sd_mm / pitch_mm, FIT_DIP_SD_MIN, FIT_DIP_SD_MAX);
     problem->dip.share = settings->dip_share;

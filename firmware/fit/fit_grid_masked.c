@@ -470,8 +470,21 @@ static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
   return (power << 22) + fit_grid_rise(at->height, offset_x, offset_y);
 }
 
-#define DEPTH_MAX_Q28 (1 << 26)      /* of the strongest node, which is from a quarter to one */
+#define DEPTH_MAX_Q28 (1 << 26)   /* of the strongest node, which is from a quarter to one */
+#define THIN_HEIGHT_Q26 160035392 /* sigma FIT_SHAPE_LEAST */
+#define DIP_END_Q15 ((int32_t)(FIT_DIP_END * 32768.0f))
 #define NARROWNESS_MAX_Q12 (1 << 11) /* a dip is wider than its contact */
+
+/* Takes FIT_DIP_END from the nearer end of an axis. */
+static NOINLINE void take_end(int32_t *dip, int32_t nodes, int32_t centre) {
+  int32_t inside_q15 = (centre >> 11) + nodes / 2 * (1 << 15);
+  int32_t last_q15 = (nodes - 1) * (1 << 15);
+  if (inside_q15 > last_q15 >> 1) {
+    inside_q15 = last_q15 - inside_q15;
+    dip += nodes - 1;
+  }
+  *dip -= (*dip >> 15) * fixed_clamp(DIP_END_Q15 - ((inside_q15 * 3) >> 2), 0, nodes > 2 ? DIP_END_Q15 : 0);
+}
 
 /* The dip at the sensors in use. */
 static NOINLINE void set_dip(const struct readings *readings, const struct fit_system *system, struct columns *c) {
@@ -486,6 +499,10 @@ static NOINLINE void set_dip(const struct readings *readings, const struct fit_s
   c->narrowness_q12 = narrowness < NARROWNESS_MAX_Q12 ? narrowness : NARROWNESS_MAX_Q12;
   struct dip dip;
   int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, 1 << 28, system->rise_q22, DEPTH_MAX_Q28, &dip);
+  if (at->height > THIN_HEIGHT_Q26) {
+    take_end(dip.x, COLUMNS, at->x);
+    take_end(dip.y, ROWS, at->y);
+  }
   for (int k = 0; k < NODES; k++) {
     int32_t along = fixed_mul_q30(depth_q28 * 4, dip.x[k / ROWS]);
     c->node[k].d = readings->residual[k] == 0 ? fixed_mul_q30(along, dip.y[k % ROWS]) : 0;

@@ -168,14 +168,6 @@ class Errors:
         self.warned = ~valid | (fits["flags"] & WARNINGS != 0)
         self.force_N = fits["force_N"]
 
-    @classmethod
-    def joined(cls, several):
-        """One after another."""
-        made = cls.__new__(cls)
-        for name in ("error_mm", "sd_mm", "warned", "force_N"):
-            setattr(made, name, np.concatenate([getattr(one, name) for one in several]))
-        return made
-
     def figures(self, inside, outside):
         error, warned = self.error_mm[inside], self.warned[inside]
         return {
@@ -199,10 +191,3 @@ def quantile(values, share):
 
 def percent(these):
     return 100 * float(np.mean(these)) if len(these) else None
-
-
-def centroid(readings, layout):
-    """[press, 2]; of the readings above zero."""
-    above = np.maximum(readings, 0.0)
-    total = above.sum(axis=1, keepdims=True)
-    return np.divide(above @ layout, total, out=np.full((len(above), 2), np.nan), where=total > 0)

@@ -15,6 +15,7 @@ Recordings that chose a constant ("chooses") judge nothing. Presses lie in rows:
 calibrations, the others are judged.
 """
 
+import functools
 import hashlib
 import json
 import os
@@ -98,17 +99,13 @@ def judge_grid(measure, one, path):
     shipped, raw = (grids.Errors(fingertip.fit(readings, known), xy) for known in (None, set_by_hand))
     accepted = [one for one in calibrations if one.good]
     guided = fingertip.guided(grid, SEED)
-    all_inside, all_outside = np.tile(inside, len(calibrated)), np.tile(outside, len(calibrated))
     worse = np.zeros(3, int)  # sessions whose median, 95th percentile, silent presses are more than those of the pad as shipped
     after = {}
     for way, several in (("random", calibrations), ("rows", in_rows), ("guided", guided)):
-        errors = [grids.Errors(fingertip.fit(readings, one.response), xy) for one in several if one.good]
+        errors = [grids.Errors(fingertip.fit(readings, one.response), xy).figures(inside, outside) for one in several if one.good]
         for each in errors:
-            worse += [each.figures(inside, outside)[name] > shipped.figures(inside, outside)[name] for name in COMPARED]
-        after[way] = [
-            100 * len(errors) / len(several),
-            *(mean_of([each.figures(inside, outside) for each in errors], name) for name in COMPARED),
-        ]
+            worse += [each[name] > shipped.figures(inside, outside)[name] for name in COMPARED]
+        after[way] = [100 * len(errors) / len(several), *(mean_of(errors, name) for name in COMPARED)]
     found = {
         "recording": one["key"],
         "part": one["part"],
@@ -116,7 +113,6 @@ def judge_grid(measure, one, path):
         "dip_percent": 100 * grids.dip_share(grid),
         "gains_cv_percent": 100 * float(grid.peak_Pa.std() / grid.peak_Pa.mean()),
         "places_off_mm": float(np.median(grid.places_off_mm)),
-        "centroid_p50_mm": grids.quantile(np.hypot(*(grids.centroid(readings, grid.layout) - xy)[inside].T), 0.5),
         "shipped": shipped.figures(inside, outside),
         "raw": raw.figures(inside, outside),
         "sessions": len(calibrations),
@@ -128,10 +124,8 @@ def judge_grid(measure, one, path):
         "worse_median_p95_silent": worse.tolist(),
     }
     if calibrated:
-        found["calibrated"] = grids.Errors.joined(calibrated).figures(all_inside, all_outside)
-        found["calibrated"]["force_scatter_percent"] = float(
-            np.mean([each.figures(inside, outside)["force_scatter_percent"] for each in calibrated])
-        )
+        figures = [each.figures(inside, outside) for each in calibrated]
+        found["calibrated"] = {name: mean_of(figures, name) for name in figures[0]}
         found["one_missing_over_1mm_percent"] = grids.percent(np.concatenate([each.error_mm for each in missing]) > 1.0)
     shown = {
         "grid": grid,
@@ -150,11 +144,7 @@ def by_time(rows, key):
 
 
 def mean_of(rows, *keys):
-    values = []
-    for row in rows:
-        for key in keys:
-            row = row.get(key) if row is not None else None
-        values.append(row)
+    values = [functools.reduce(lambda found, key: (found or {}).get(key), keys, row) for row in rows]
     return None if not values or None in values else float(np.mean(values))
 
 
@@ -167,17 +157,8 @@ def judge_grids(measure, source, here):
             found.append(row)
     rows = [row for row in found if row["part"] == "judges"]
     figures = {f"raw_{name}": mean_of(rows, "raw", name) for name in ("inside_p50_mm", "over_2mm_percent")}
-    for name in (
-        "inside_p50_mm",
-        "inside_p95_mm",
-        "over_1mm_percent",
-        "silent_percent",
-        "warned_percent",
-        "cover_1sd_percent",
-        "outside_p50_mm",
-        "force_scatter_percent",
-    ):
-        figures[f"cal_{name}"] = mean_of(rows, "calibrated", name)
+    cal = [name for name, _, _ in GOALS if name.startswith("cal_")]
+    figures |= {name: mean_of(rows, "calibrated", name.removeprefix("cal_")) for name in cal}
     figures["cal_cover_1sd_most_percent"] = figures["cal_cover_1sd_percent"]
     for name, accepted in (("sessions_accepted_percent", "accepted"), ("rows_accepted_percent", "rows_accepted")):
         figures[name] = 100 * sum(row[accepted] for row in rows) / sum(row["sessions"] for row in rows) if rows else None
@@ -191,8 +172,6 @@ def judge_grids(measure, source, here):
 def judge_strips(firmware, source, here):
     wanted = [one for one in source["files"] if one["name"] in here]
     names = ("phantom_percent_1308", "phantom_percent_57", "doubted_percent")
-    if not wanted:
-        return {**dict.fromkeys([*names, *(f"{name}_by_file" for name in names), "holds_missed"]), "strips": []}
     print(f"        {len(wanted)} recordings of strips", flush=True)
     read = {one["name"]: (one["part"], strips.Strip(here[one["name"]])) for one in wanted}
     rates = {name: [strip.gate(firmware, *rate) for rate in strips.RATES] for name, (_, strip) in read.items()}
@@ -201,7 +180,6 @@ def judge_strips(firmware, source, here):
     columns = ((fast, "phantom_percent"), (slow, "phantom_percent"), (fast, "doubted_percent"))
     return {
         **{name: by_time(*column) for name, column in zip(names, columns)},
-        **{f"{name}_by_file": mean_of(*column) for name, column in zip(names, columns)},
         "holds_missed": sum(one["held_missed"] for one in judged) if judged else None,
         "strips": [
             {"recording": name, "part": part, "holds": len(strip.holds)}

@@ -14,11 +14,11 @@ extern "C" {
 using namespace fingertip::calibrating;
 using namespace fingertip::measure;
 
-MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(solved), FIELD(helps), FIELD(has_own), FIELD(width_mm),
-               FIELD(residual_share), FIELD(sigma_sd_mm), FIELD(dip), FIELD(dip_sd), FIELD(position_mm), FIELD(halves_shape),
-               FIELD(halves_gauge), FIELD(force_scale), FIELD(force_scale_sd), FIELD(prior_sigma_mm), FIELD(prior_width_mm),
-               FIELD(dip_share), FIELD(dip_sd_mm), FIELD(worst_shape_sd), FIELD(gauge_sd), FIELD(force_share), FIELD(ellipse),
-               FIELD(offset_share), FIELD(drift_share), FIELD(slope), FIELD(kept_share), FIELD(wanted_x_mm), FIELD(wanted_y_mm))
+MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(solved), FIELD(has_own), FIELD(width_mm), FIELD(residual_share),
+               FIELD(sigma_sd_mm), FIELD(dip), FIELD(dip_sd), FIELD(position_mm), FIELD(halves_shape), FIELD(halves_gauge),
+               FIELD(force_scale), FIELD(force_scale_sd), FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(dip_share), FIELD(dip_sd_mm),
+               FIELD(worst_shape_sd), FIELD(force_share), FIELD(ellipse), FIELD(offset_share), FIELD(drift_share), FIELD(slope),
+               FIELD(wanted_x_mm), FIELD(wanted_y_mm))
 
 MEASURE_RECORD(calibrated_sensor, FIELD(gain), FIELD(gain_sd), FIELD(reading_sd), FIELD(off_x_mm), FIELD(off_y_mm), FIELD(wider))
 
@@ -28,7 +28,6 @@ static calibration found_by(const Judgement &judgement, const Shape &shape) {
   found.state = static_cast<std::int32_t>(judgement.state);
   std::strncpy(found.reason, name_of(judgement.reason), sizeof found.reason - 1);
   found.solved = solution.solved;
-  found.helps = judgement.helps && judgement.gains_help;
   found.width_mm = solution.sigma_mm;
   found.residual_share = solution.residual_share;
   found.prior_sigma_mm = shape.sigma_mm;
@@ -36,13 +35,11 @@ static calibration found_by(const Judgement &judgement, const Shape &shape) {
   found.dip_share = shape.dip_share;
   found.dip_sd_mm = shape.dip_sd_mm;
   found.worst_shape_sd = solution.worst_shape_sd();
-  found.gauge_sd = solution.gauge_sd;
   found.force_share = judgement.force_share;
   found.ellipse = judgement.ellipse;
   found.offset_share = judgement.offset_share;
   found.drift_share = judgement.drift_share;
   found.slope = judgement.slope;
-  found.kept_share = judgement.kept_share;
   found.sigma_sd_mm = solution.sigma_sd_mm;
   found.dip = solution.dip;
   found.dip_sd = solution.dip_sd;

@@ -14,13 +14,13 @@ extern "C" {
 struct calibration {
   std::int32_t state; // 0: more, 1: good, 2: refused
   char reason[16];
-  bool solved, helps;
+  bool solved;
   bool has_own; // the tool would keep `own`
   double width_mm, residual_share;
   double prior_sigma_mm, prior_width_mm, dip_share, dip_sd_mm; // as fit_settings has them
   double sigma_sd_mm, dip, dip_sd, position_mm, halves_shape, halves_gauge;
   double force_scale, force_scale_sd; // 0: there is none
-  double worst_shape_sd, gauge_sd, force_share, ellipse, offset_share, drift_share, slope, kept_share;
+  double worst_shape_sd, force_share, ellipse, offset_share, drift_share, slope;
   double wanted_x_mm, wanted_y_mm; // where a placement more would help most
 };
 // What it found of one sensor.

@@ -5,6 +5,7 @@
 extern "C" {
 #include "common/contact_flags.h"
 #include "fit/fit.h"
+#include "fit/fit_limits.h"
 }
 
 #include <algorithm>
@@ -373,8 +374,10 @@ bool goes_astray(const Array &array, const Solution &s) {
       press.usable = (1u << array.sensors()) - 1u;
       for (std::size_t k = 0; k < array.sensors(); k++) {
         const double per = std::pow(std::hypot(array.x_mm[k] - x, array.y_mm[k] - y) / s.width_mm, 2) / 2.0;
+        const double there = fit_dip_there(&fit.of, float(s.sigma_mm / array.pitch_mm), float(x / array.pitch_mm),
+                                           float(y / array.pitch_mm), fit.of.x[k], fit.of.y[k]);
         press.reading_Pa.push_back(s.peak_Pa * ((1.0 - s.mixing) * std::exp(-per) + s.mixing * std::exp(-per / (NARROW * NARROW)) -
-                                                s.dip * std::exp(-per / (s.dip_widths * s.dip_widths))));
+                                                there * s.dip * std::exp(-per / (s.dip_widths * s.dip_widths))));
       }
       const auto found = fit(press, ones);
       if (!found || std::hypot(double(found->x_mm) - x, double(found->y_mm) - y) > ASTRAY_PITCHES * array.pitch_mm) {

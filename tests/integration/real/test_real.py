@@ -54,11 +54,14 @@ class Real(unittest.TestCase):
     def checksum(self):
         return hashlib.sha256(self.grid.read_bytes()).hexdigest()
 
-    def run_tool(self):
+    def run_tool(self, error=""):
         path = self.folder / "sources.json"
         path.write_text(json.dumps(self.sources))
         words = [sys.executable, ROOT / "host_tools/report/real/real.py", "--build", BUILD, "-o", self.folder / "out", "--pads", "1"]
-        return subprocess.run([*words, "--sources", path, self.folder / "data"], capture_output=True, text=True)
+        done = subprocess.run([*words, "--sources", path, self.folder / "data"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 1 if error else 0, done.stderr)
+        self.assertIn(error, done.stderr)
+        return None if error else json.loads((self.folder / "out/real.json").read_text())
 
     def test_the_layout_is_found_turned(self):
         grid = grids.Grid(self.grid, PITCH_MM)
@@ -68,9 +71,7 @@ class Real(unittest.TestCase):
         self.assertFalse((grid.inside & grid.outside).any())
 
     def test_presses_of_a_gaussian_are_found_where_they_are(self):
-        done = self.run_tool()
-        self.assertEqual(done.returncode, 0, done.stderr)
-        found = json.loads((self.folder / "out/real.json").read_text())
+        found = self.run_tool()
         self.assertLess(found["raw_inside_p50_mm"], 0.02)
         self.assertLess(found["grids"][0]["raw"]["force_scatter_percent"], 1.0)
         self.assertTrue(found["goals"]["raw_inside_p50_mm"]["met"])
@@ -84,24 +85,18 @@ class Real(unittest.TestCase):
     def test_gains_that_differ_move_them_and_a_calibration_mends_it(self):
         write_grid(self.grid, (1.2, 0.8, 1.1, 0.9, 1.0, 1.2, 0.8, 1.0))
         self.sources["grids"]["files"][0]["sha256"] = self.checksum()
-        done = self.run_tool()
-        self.assertEqual(done.returncode, 0, done.stderr)
-        row = json.loads((self.folder / "out/real.json").read_text())["grids"][0]
+        row = self.run_tool()["grids"][0]
         self.assertGreater(row["raw"]["inside_p50_mm"], 0.3)
         self.assertLess(row["calibrated"]["inside_p50_mm"], 0.2 * row["raw"]["inside_p50_mm"])
 
     def test_another_file_of_that_name_is_not_taken(self):
         self.sources["grids"]["files"][0]["sha256"] = "0" * 64
-        done = self.run_tool()
-        self.assertEqual(done.returncode, 1)
-        self.assertIn("none of the recordings of sources.json is there", done.stderr)
+        self.run_tool("none of the recordings of sources.json is there")
 
     def test_a_file_of_other_columns_is_refused_by_its_name(self):
         self.grid.write_text("1,2,3\n")
         self.sources["grids"]["files"][0]["sha256"] = self.checksum()
-        done = self.run_tool()
-        self.assertEqual(done.returncode, 1)
-        self.assertIn("grid.csv: rows are not x, y and eight readings", done.stderr)
+        self.run_tool("grid.csv: rows are not x, y and eight readings")
 
 
 if __name__ == "__main__":
