@@ -26,6 +26,7 @@ class Usage(CliTest):
             self.assertIn(f"Usage: fingertip {command}", page)
             self.assertLessEqual(max(map(len, page.splitlines())), 80, command)
             self.assertNotRegex(page, r"FLOAT|INT|TEXT| in \[", command)  # the library's own words
+        self.assertEqual(sum(f"\nExample: fingertip {command} " in page for command, page in pages.items()), 6)
         self.assertIn("slip_window=MS (5 to 1000, and 160 frames at most), prior=SIGMA[:WIDTH]|none", " ".join(pages["set"].split()))
 
     def test_wrong_usage(self):

@@ -94,7 +94,6 @@ class Recording(CliTest):
         self.assertIn("exists already", self.error("record", self.csv))
         self.assertIn("exists already", self.error("monitor", "--record", self.csv))
         self.assertIn("exists already", self.error("record", self.path("2.csv"), "--raw-bytes", self.csv))
-        # nor does --overwrite touch them while nothing answers
         self.assertIn("no such port", self.error("record", self.csv, "--port", self.port, "--overwrite"))
         heard = os.path.join(self.folder, "heard")
         with self.device("mute=1", f"heard={heard}"):
