@@ -165,7 +165,7 @@ static void broadcast(struct sim_array *array, uint64_t t_us) {
     }
   }
   if (anybody) {
-    array->result.acknowledged = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
+    array->result.acknowledged = first_sensors(array->sensor_count);
   } else {
     array->result.nacks++;
   }
@@ -198,7 +198,7 @@ static void read_one(struct sim_array *array, unsigned k, uint64_t t_us) {
     array->result.nacks++;
     return;
   }
-  array->result.acknowledged |= UINT32_C(1) << k;
+  array->result.acknowledged |= sensor_bit(k);
   spoil_bytes(array, array->result.bytes[k]);
 }
 

@@ -41,11 +41,11 @@ static void reset_muxes(struct mux_bus *bus, uint8_t muxes) {
   }
 }
 
-static uint32_t sensors_of(uint8_t muxes) {
-  uint32_t sensors = 0;
+static sensor_map sensors_of(uint8_t muxes) {
+  sensor_map sensors = 0;
   for (unsigned mux = 0; mux < BOARD_MUX_COUNT; mux++) {
     if ((muxes >> mux & 1) != 0) {
-      sensors |= (uint32_t)ALL_CHANNELS << mux * BOARD_SENSORS_OF_STRIP;
+      sensors |= (sensor_map)ALL_CHANNELS << mux * BOARD_SENSORS_OF_STRIP;
     }
   }
   return sensors;
@@ -135,7 +135,7 @@ static void account_select(struct mux_bus *bus, bool acknowledged) {
 
 /* A sensor that answered last time and now does not is asked once more. */
 static void account_fetch(struct mux_bus *bus, bool acknowledged, const uint8_t *bytes) {
-  const uint32_t bit = UINT32_C(1) << bus->sensor;
+  const sensor_map bit = sensor_bit(bus->sensor);
   if (!acknowledged && (bus->answers & bit) != 0) {
     bus->answers &= ~bit;
     return;

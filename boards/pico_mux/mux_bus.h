@@ -32,7 +32,7 @@ struct mux_bus {
   bool command_sent;
   uint8_t sensor; /* during a read: the one whose turn it is; after it, BOARD_SENSOR_COUNT */
 
-  uint32_t answers;    /* bitmap of sensors: acknowledged the last fetch */
+  sensor_map answers;  /* bitmap of sensors: acknowledged the last fetch */
   uint8_t mux_answers; /* bitmap of multiplexers: acknowledged the last selection */
 
   uint8_t open[BOARD_MUX_COUNT]; /* [mux] channels that are on, by what it acknowledged last */

@@ -13,14 +13,6 @@
 #define START_ns 2000u
 #define FREE_INTERVAL_MAX 1024u
 
-static unsigned count_bits(unsigned bitmap) {
-  unsigned bits = 0;
-  for (; bitmap != 0; bitmap &= bitmap - 1) {
-    bits++;
-  }
-  return bits;
-}
-
 static void play(struct parallel_bus *bus, const uint16_t *steps, unsigned cell_count, uint64_t now_us) {
   bus->deadline_us = now_us + LONGEST_us;
   wave_player_start(steps, bus->samples, cell_count);
@@ -149,7 +141,7 @@ static enum ft_status judge(struct parallel_bus *bus, struct array_bus_result *r
   }
   bus->stuck = reply.held;
   result->acknowledged = reply.acknowledged;
-  result->nacks = count_bits(BOARD_SDA_LINES & ~reply.acknowledged);
+  result->nacks = count_sensors(BOARD_SDA_LINES & ~reply.acknowledged);
   return FT_OK;
 }
 

@@ -29,8 +29,9 @@ struct second {
   uint64_t began_us;
   uint64_t idle_since_us; /* unless app.active */
   uint64_t asleep_us;
-  uint32_t frames;                     /* at its beginning */
-  uint32_t timeouts, skipped, present; /* of the scan, at its beginning */
+  uint32_t frames;            /* at its beginning */
+  uint32_t timeouts, skipped; /* of the scan, at its beginning */
+  sensor_map present;         /* the same */
   uint32_t uptime_s, uptime_rest_us;
   uint32_t rate_mHz;
   uint16_t busy_permille;

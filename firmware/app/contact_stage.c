@@ -14,7 +14,7 @@ void contact_stage_gather(struct findings *found, bool calibrated) {
       .tared = conditioned->tared,
       .zero_doubtful = conditioned->zero_doubtful,
       .sensor_doubtful = is_sensor_doubtful(found),
-      .masked = conditioned->usable != UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count),
+      .masked = conditioned->usable != first_sensors(frame->sensor_count),
       .calibrated = calibrated,
       .unsettled = frame->unsettled,
       .saturated = frame->saturated,

@@ -12,7 +12,6 @@
 #include "fit/fit_tangential.h"
 #include "frame/frame.h"
 
-#include <stdbool.h>
 #include <stdint.h>
 
 struct findings {

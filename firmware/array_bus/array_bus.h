@@ -16,8 +16,8 @@
 enum { ARRAY_BUS_MAX_READ_BYTES = 3 };
 
 struct array_bus_result {
-  uint32_t acknowledged;                                   /* bitmap of the sensors that acknowledged every byte; after a command sent
-                                                              as a broadcast, all sensors of a branch that acknowledged as one */
+  sensor_map acknowledged;                                 /* bitmap of the sensors that acknowledged every byte; after a command sent
+                                                            as a broadcast, all sensors of a branch that acknowledged as one */
   uint32_t nacks;                                          /* transfers without an acknowledgement, multiplexers included */
   uint8_t bytes[FT_MAX_SENSORS][ARRAY_BUS_MAX_READ_BYTES]; /* [sensor][byte as received]; after
                             start_read, for acknowledged sensors only */

@@ -16,7 +16,7 @@ int32_t apart_median(int32_t values[], int count) {
 
 static int32_t size_of(int32_t value) { return value < 0 ? -value : value; }
 
-uint32_t apart_find(const int32_t value[], uint32_t which, uint8_t sensor_count, int32_t floor) {
+sensor_map apart_find(const int32_t value[], sensor_map which, uint8_t sensor_count, int32_t floor) {
   int32_t sorted[FT_MAX_SENSORS];
   int count = 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
@@ -32,10 +32,10 @@ uint32_t apart_find(const int32_t value[], uint32_t which, uint8_t sensor_count,
     sorted[i] = size_of(sorted[i] - middle);
   }
   const int32_t limit = floor + APART_SPREADS * apart_median(sorted, count);
-  uint32_t apart = 0;
+  sensor_map apart = 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
     if ((which >> k & 1u) && size_of(value[k] - middle) > limit) {
-      apart |= UINT32_C(1) << k;
+      apart |= sensor_bit(k);
     }
   }
   return apart;

@@ -6,6 +6,8 @@
  * is no fault. With fewer than APART_VOTERS_MIN nothing is apart. */
 #pragma once
 
+#include "common/limits.h"
+
 #include <stdint.h>
 
 #define APART_SPREADS 10
@@ -16,4 +18,4 @@ int32_t apart_median(int32_t values[], int count);
 
 /* value: [sensor], of a size below 1e8; which: bitmap of those that count, of sensor_count. Returns
  * the bitmap of those apart. Cost: up to 250 Cortex-M0+ cycles a sensor. */
-uint32_t apart_find(const int32_t value[], uint32_t which, uint8_t sensor_count, int32_t floor);
+sensor_map apart_find(const int32_t value[], sensor_map which, uint8_t sensor_count, int32_t floor);

@@ -1,7 +1,9 @@
 /* Sizes that several modules share. */
 #pragma once
 
-/* Sensors of one array; a bitmap of sensors is a uint32_t, bit k = sensor k. */
+#include <stdint.h>
+
+/* Sensors of one array. */
 #define FT_MAX_SENSORS 32
 
 /* Stack of the main loop and the interrupts of a board's image, in bytes: what is reserved, and what any scene may use
@@ -16,3 +18,22 @@
 /* Moulding presses on the sensors: at rest those of four real strips differed by 2 to 12 kPa. A sensitivity that is off by 1 % moves the
  * reading at 1 bar by 2.9 kPa: what is apart by less than this is no worse than the gains of a pad may be. */
 #define FT_APART_MAX_Pa 20000
+
+/* A map of sensors: bit k is sensor k. */
+typedef uint32_t sensor_map;
+
+static inline sensor_map sensor_bit(unsigned sensor) { return (sensor_map)1 << sensor; }
+
+/* Sensors 0 to count - 1; count: 1..FT_MAX_SENSORS. */
+static inline sensor_map first_sensors(unsigned count) {
+  /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */
+  return ~(sensor_map)0 >> (8 * sizeof(sensor_map) - count);
+}
+
+static inline unsigned count_sensors(sensor_map map) {
+  unsigned count = 0;
+  for (; map; map &= map - 1) {
+    count++;
+  }
+  return count;
+}

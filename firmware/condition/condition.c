@@ -6,7 +6,7 @@
 #include <string.h>
 
 /* warm: bitmap of the sensors that were calm just now. */
-static void begin(struct condition *condition, uint32_t warm) {
+static void begin(struct condition *condition, sensor_map warm) {
   memset(condition, 0, sizeof *condition);
   condition->gate.released_ms = AGE_MAX_ms;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++, warm >>= 1) {
@@ -17,10 +17,10 @@ static void begin(struct condition *condition, uint32_t warm) {
 void condition_start(struct condition *condition) { begin(condition, 0); }
 
 void condition_tare(struct condition *condition) {
-  uint32_t warm = ~condition->taring;
+  sensor_map warm = ~condition->taring;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
     if (condition->sensor[k].spread_Pa_q10 > Pa_q10(ZERO_WARM_Pa)) {
-      warm &= ~(UINT32_C(1) << k);
+      warm &= ~sensor_bit(k);
     }
   }
   begin(condition, warm);
@@ -57,7 +57,7 @@ static void take(struct condition *condition, uint8_t k, int32_t reading_Pa_q10)
   const int32_t level = clamp(mean, -LEVEL_MAX, LEVEL_MAX);
   sensor->level_Pa_q10 = sensor->rests_Pa_q10 = sensor->before_Pa_q10 = sensor->slow_Pa_q10 = level;
   sensor->updated_ms = condition->now_ms;
-  condition->taring &= ~(UINT32_C(1) << k);
+  condition->taring &= ~sensor_bit(k);
   condition->zero_Pa_q10[k] = level;
   condition->margin_Pa_q10[k] = sensor->spread_Pa_q10;
   condition->tared_ms = 0;
@@ -66,12 +66,12 @@ static void take(struct condition *condition, uint8_t k, int32_t reading_Pa_q10)
 
 /* Takes the readings of sensors that are tared now, and returns the bitmap of those that were. In a contact that others measure it waits,
  * but not for ever, for wrong zeros may make it: what is taken then is a guess until the contact ends. */
-static uint32_t tare_sensors(struct condition *condition, const struct frame *frame, uint32_t readable) {
-  uint32_t ready = readable;
-  uint32_t guesses = condition->gate.pressed ? 0 : condition->guessed;
+static sensor_map tare_sensors(struct condition *condition, const struct frame *frame, sensor_map readable) {
+  sensor_map ready = readable;
+  sensor_map guesses = condition->gate.pressed ? 0 : condition->guessed;
   bool is_shared = condition->gate.pressed && !condition->unsure && (readable & ~condition->taring) != 0;
   for (uint8_t k = 0; k < frame->sensor_count; k++) {
-    uint32_t bit = UINT32_C(1) << k;
+    sensor_map bit = sensor_bit(k);
     const uint32_t age_ms = condition->now_ms - condition->sensor[k].tare_begun_ms;
     if (frame->renewed & bit || (frame->restored & bit && age_ms < FOUND_OUT_ms)) {
       update_begin_tare(condition, k, Pa_q10(ZERO_COLD_Pa));
@@ -101,7 +101,7 @@ static uint8_t read_sensors(const struct condition *condition, const struct fram
                             struct conditioned *conditioned) {
   int32_t peak = 0;
   uint8_t strongest = 0;
-  uint32_t ready = conditioned->usable;
+  sensor_map ready = conditioned->usable;
   for (uint8_t k = 0; k < frame->sensor_count; k++, ready >>= 1) {
     if (!(ready & 1u)) {
       conditioned->pressure_Pa_q10[k] = 0;
@@ -122,7 +122,7 @@ static uint8_t read_sensors(const struct condition *condition, const struct fram
 }
 
 /* For the means that the zeros follow while nothing touches. */
-static void sum_up(struct condition *condition, const struct frame *frame, uint32_t usable) {
+static void sum_up(struct condition *condition, const struct frame *frame, sensor_map usable) {
   for (uint8_t k = 0; usable != 0; k++, usable >>= 1) {
     if (usable & 1u && condition->summed[k] < UINT8_MAX) {
       int32_t above = clamped_difference(frame->pressure_Pa_q10[k], condition->zero_Pa_q10[k]);
@@ -134,7 +134,7 @@ static void sum_up(struct condition *condition, const struct frame *frame, uint3
 
 /* By how much a zero may be off: what it has taken without a proof, or has not settled yet. The zeros do not move in a
  * contact, and so neither does this. */
-static int32_t taken_into_zeros(const struct condition *condition, uint32_t usable, uint8_t count) {
+static int32_t taken_into_zeros(const struct condition *condition, sensor_map usable, uint8_t count) {
   int32_t most = 0;
   for (uint8_t k = 0; k < count; k++, usable >>= 1) {
     const struct condition_sensor *sensor = &condition->sensor[k];
@@ -234,7 +234,7 @@ static bool is_unsure(const struct condition *condition, const struct conditione
 
 /* Sets .sure, and returns whether a force and a zero that has moved look alike. After the updates of this frame. */
 static bool is_doubtful(struct condition *condition, const struct conditioned *conditioned, int32_t peak, bool saturated) {
-  const uint32_t usable = conditioned->usable;
+  const sensor_map usable = conditioned->usable;
   if (!condition->gate.pressed) {
     condition->sure = false;
     return conditioned->contact || (condition->zero_risen & usable) != 0;
@@ -251,7 +251,7 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
   const bool saturated = frame->saturated != 0;
   begin_frame(condition, frame);
 
-  const uint32_t readable = frame->valid & ~frame->saturated;
+  const sensor_map readable = frame->valid & ~frame->saturated;
   conditioned->usable = readable;
   if (condition->taring & readable || frame->renewed || frame->restored || condition->guessed) {
     conditioned->usable = tare_sensors(condition, frame, readable);

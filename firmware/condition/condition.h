@@ -98,14 +98,14 @@ struct condition {
   bool unsure;       /* a contact that the zero follows */
   bool sure;         /* a contact without doubt */
 
-  uint32_t taring;     /* bitmap: tare_left is not 0 */
-  uint32_t guessed;    /* bitmap: tared in a contact that others measure */
-  uint32_t restless;   /* bitmap: the level does not keep up, no calm */
-  uint32_t below;      /* bitmap: too far below zero */
-  uint32_t firm;       /* bitmap: stronger than what the zero has wandered */
-  uint32_t sudden;     /* bitmap: stronger than what may have crept up */
-  uint32_t to_learn;   /* bitmap: a contact has ended, and its past_share has not learnt from it */
-  uint32_t zero_risen; /* bitmap: the zero has taken more than opens the gate */
+  sensor_map taring;     /* bitmap: tare_left is not 0 */
+  sensor_map guessed;    /* bitmap: tared in a contact that others measure */
+  sensor_map restless;   /* bitmap: the level does not keep up, no calm */
+  sensor_map below;      /* bitmap: too far below zero */
+  sensor_map firm;       /* bitmap: stronger than what the zero has wandered */
+  sensor_map sudden;     /* bitmap: stronger than what may have crept up */
+  sensor_map to_learn;   /* bitmap: a contact has ended, and its past_share has not learnt from it */
+  sensor_map zero_risen; /* bitmap: the zero has taken more than opens the gate */
 
   /* Of the whole pad. */
   int32_t memory_Pa_q10, reached_Pa_q10; /* as of a sensor, three quarters of the strongest */
@@ -131,7 +131,7 @@ struct condition_gains {
 };
 
 struct conditioned {
-  uint32_t usable;                         /* bitmap: tared, valid and not saturated */
+  sensor_map usable;                       /* bitmap: tared, valid and not saturated */
   bool tared;                              /* every valid sensor is, there is one, and none is far below */
   bool contact;                            /* the gate */
   bool zero_doubtful;                      /* a force and a zero that has moved look alike */

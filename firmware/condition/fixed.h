@@ -2,6 +2,8 @@
  * shift makes of microseconds. A share is a factor below 1, in 1/65536. */
 #pragma once
 
+#include "common/limits.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -31,4 +33,4 @@ int32_t share_in(int32_t ms, int32_t time_constant_ms);
 /* Change in this time at a rate per second. */
 int32_t in_step(int32_t each_second, int32_t ms);
 
-static inline void set_bit(uint32_t *bitmap, uint8_t k, bool set) { *bitmap = (*bitmap & ~(UINT32_C(1) << k)) | (uint32_t)set << k; }
+static inline void set_bit(sensor_map *bitmap, uint8_t k, bool set) { *bitmap = (*bitmap & ~sensor_bit(k)) | (sensor_map)set << k; }

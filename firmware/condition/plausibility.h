@@ -13,10 +13,10 @@
 #include <stdint.h>
 
 struct plausibility {
-  int32_t apart_Pa;  /* the floor, set by the caller */
-  uint32_t apart;    /* bitmap: when nothing last touched the pad */
-  uint32_t compared; /* bitmap */
-  uint64_t next_us;  /* the next comparison not before */
+  int32_t apart_Pa;    /* the floor, set by the caller */
+  sensor_map apart;    /* bitmap: when nothing last touched the pad */
+  sensor_map compared; /* bitmap */
+  uint64_t next_us;    /* the next comparison not before */
 };
 
 bool plausibility_compare(struct plausibility *plausibility, const struct frame *frame, const struct conditioned *conditioned);

@@ -7,7 +7,7 @@ struct step {
   struct condition *condition;
   struct condition_sensor *sensor;
   uint8_t k;
-  uint32_t usable;
+  sensor_map usable;
   int32_t ms; /* since the last update */
   int32_t memory_share, wander_share;
   int32_t noise_Pa_q10;
@@ -57,7 +57,7 @@ static void follow_past(const struct step *step) {
 }
 
 /* What five and more sensors all keep is a force that is left: rubber keeps unlike shares. Of fewer it may be either. */
-static bool is_left_by_force(const struct condition *condition, uint32_t usable) {
+static bool is_left_by_force(const struct condition *condition, sensor_map usable) {
   int pressed = 0;
   for (uint8_t k = 0; usable != 0; k++, usable >>= 1) {
     const struct condition_sensor *sensor = &condition->sensor[k];
@@ -75,7 +75,7 @@ static bool is_left_by_force(const struct condition *condition, uint32_t usable)
 /* What is left after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd. */
 static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
   struct condition_sensor *sensor = step->sensor;
-  const uint32_t bit = UINT32_C(1) << step->k;
+  const sensor_map bit = sensor_bit(step->k);
   if (!(step->condition->to_learn & bit) || step->condition->gate.released_ms < PAST_SHOWS_ms) {
     return;
   }
@@ -107,7 +107,7 @@ static void follow_rest(const struct step *step) {
 void update_past_shows(struct condition *condition, uint8_t count) {
   for (uint8_t k = 0; k < count; k++) {
     struct condition_sensor *sensor = &condition->sensor[k];
-    condition->to_learn |= UINT32_C(1) << k;
+    condition->to_learn |= sensor_bit(k);
     sensor->past_Pa_q10 = larger(sensor->past_Pa_q10, sensor->reached_Pa_q10);
   }
 }
@@ -134,8 +134,8 @@ void update_begin_tare(struct condition *condition, uint8_t k, int32_t spread_Pa
   condition->faded_Pa_q10[k] = condition->margin_Pa_q10[k] = 0;
   condition->sum_Pa_q10[k] = 0;
   condition->summed[k] = 0;
-  condition->taring |= UINT32_C(1) << k;
-  const uint32_t others = ~(UINT32_C(1) << k);
+  condition->taring |= sensor_bit(k);
+  const sensor_map others = ~sensor_bit(k);
   condition->guessed &= others;
   condition->restless &= others;
   condition->below &= others;
@@ -236,7 +236,7 @@ static bool settle(const struct step *step) {
   if (spread <= size_of(step->above_Pa_q10)) {
     return false;
   }
-  condition->to_learn &= ~(UINT32_C(1) << step->k);
+  condition->to_learn &= ~sensor_bit(step->k);
   sensor->level_Pa_q10 += step->above_Pa_q10;
   int32_t goal = SETTLE_SLOW * size_of(step->slow_Pa_q10);
   goal = goal > spread ? spread : goal;
@@ -350,7 +350,7 @@ static bool moves(const struct step *step, int32_t before_Pa_q10, int32_t above_
 
 void update_sensor(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned, uint8_t k) {
   struct condition_sensor *sensor = &condition->sensor[k];
-  const uint32_t bit = UINT32_C(1) << k;
+  const sensor_map bit = sensor_bit(k);
   const uint32_t gap_ms = condition->now_ms - sensor->updated_ms;
   const int32_t ms = gap_ms < STEP_MAX_ms ? (int32_t)gap_ms : STEP_MAX_ms;
   sensor->updated_ms = condition->now_ms;

@@ -2,14 +2,6 @@
 
 #include "common/contact_flags.h"
 
-static bool fewer_bits_than(uint32_t bitmap, int limit) {
-  int bits = 0;
-  for (; bitmap && bits < limit; bitmap &= bitmap - 1) {
-    bits++;
-  }
-  return bits < limit;
-}
-
 /* An uncertain location shows motion as well as any: what gains and model add to it moves with the contact. What the
  * noise adds does not, and beside a doubtful zero a falling force alone moves it. */
 static bool shows_motion(const struct contact_input *input, uint32_t flags) {
@@ -30,8 +22,8 @@ struct contact_force contact_weigh(const struct contact_settings *settings, cons
   return weighed;
 }
 
-bool contact_is_lower_bound(const struct fit_result *fit, uint32_t saturated) {
-  return saturated && fewer_bits_than(fit->used, CONTACT_MIN_UNSATURATED);
+bool contact_is_lower_bound(const struct fit_result *fit, sensor_map saturated) {
+  return saturated && count_sensors(fit->used) < CONTACT_MIN_UNSATURATED;
 }
 
 void contact_judge(const struct contact_input *input, struct contact_result *result) {
@@ -53,7 +45,7 @@ void contact_judge(const struct contact_input *input, struct contact_result *res
 }
 
 /* A location that other settled sensors show may be another. One is passed over, a second begins the history again. */
-static bool is_passed_over(struct slip_history *history, uint32_t used) {
+static bool is_passed_over(struct slip_history *history, sensor_map used) {
   const bool stays = used == history->newest;
   history->newest = used;
   if (used != history->used && history->count != 0) {

@@ -24,8 +24,8 @@ struct contact_input {
   bool zero_doubtful;                      /* see condition.h */
   bool sensor_doubtful;                    /* a sensor in use is doubtful, see frame.h */
   bool calibrated;                         /* gains and force scale of a calibration act */
-  uint32_t unsettled;                      /* bitmap, see frame.h */
-  uint32_t saturated;                      /* bitmap: left out of the fit for being beyond their range */
+  sensor_map unsettled;                    /* bitmap, see frame.h */
+  sensor_map saturated;                    /* bitmap: left out of the fit for being beyond their range */
   const struct fit_result *fit;            /* NULL where nothing was fitted */
   const struct fit_tangential *tangential; /* NULL where nothing was estimated */
 };
@@ -42,7 +42,7 @@ struct contact_force {
 /* With fewer unsaturated sensors the peak is extrapolated, and the force a lower bound. */
 #define CONTACT_MIN_UNSATURATED 5
 
-bool contact_is_lower_bound(const struct fit_result *fit, uint32_t saturated);
+bool contact_is_lower_bound(const struct fit_result *fit, sensor_map saturated);
 
 /* The force of a fit, scaled; its standard deviation holds that of the scale. largest_Pa: reading, of any size where a
  * sensor is saturated. A fit at its bound, or whose middle is not known to within its width, may have any pressure

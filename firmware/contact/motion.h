@@ -97,7 +97,7 @@ struct motion_history {
   struct motion motion;        /* as judged */
   int32_t scale_q8;            /* of the tangential force, newest frame */
   int32_t crosstalk_q8;        /* the same: see motion.c */
-  uint32_t used;               /* bitmap: sensors in use */
+  sensor_map used;             /* bitmap: sensors in use */
   bool velocity_valid, moving, sliding;
   bool stepped;     /* slow has an entry that is not judged yet */
   bool slow_slides; /* at the newest that is */

@@ -9,6 +9,8 @@
  * Positions are integers of 1/16 um, so the running sums are exact however long they run. The cost does not grow with n. */
 #pragma once
 
+#include "common/limits.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -19,10 +21,10 @@
 struct slip_history {
   uint64_t t_us[SLIP_CAPACITY];
   int32_t x_16th_um[SLIP_CAPACITY], y_16th_um[SLIP_CAPACITY];
-  uint16_t oldest, count; /* ring */
-  bool spans;             /* the window has been filled since the last reset or pause */
-  int32_t x_sum, y_sum;   /* over the ring */
-  uint32_t used, newest;  /* bitmaps: settled sensors of the locations, and of the newest frame; contact.c */
+  uint16_t oldest, count;  /* ring */
+  bool spans;              /* the window has been filled since the last reset or pause */
+  int32_t x_sum, y_sum;    /* over the ring */
+  sensor_map used, newest; /* bitmaps: settled sensors of the locations, and of the newest frame; contact.c */
 };
 
 /* Forgets the past: call when contact is lost or the location cannot be trusted. */

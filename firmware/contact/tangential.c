@@ -35,7 +35,7 @@ void tangential_use(struct tangential_settings *tangential, const struct pad_pro
   }
 }
 
-bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated) {
+bool tangential_is_worthwhile(const struct fit_result *fit, sensor_map saturated) {
   return (fit->flags & CONTACT_FLAG_FIT_VALID) && !(fit->flags & (CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND)) &&
          !contact_is_lower_bound(fit, saturated);
 }

@@ -52,7 +52,7 @@ struct tangential_force {
 };
 
 /* Whether an estimate from this fit is worth its time; saturated: bitmap of the sensors that were left out for it. */
-bool tangential_is_worthwhile(const struct fit_result *fit, uint32_t saturated);
+bool tangential_is_worthwhile(const struct fit_result *fit, sensor_map saturated);
 
 /* The estimate of a contact from frame to frame; of all zeros: of none. */
 struct tangential_course {
@@ -66,8 +66,8 @@ struct tangential_job {
   const struct fit_array *array;
   struct fit_pad pad;
   struct tangential_question {
-    bool begins;        /* a course: forget the one before */
-    uint32_t saturated; /* bitmap of the sensors that were left out for it */
+    bool begins;          /* a course: forget the one before */
+    sensor_map saturated; /* bitmap of the sensors that were left out for it */
     uint64_t t_us;
     const int32_t *pressure_Pa_q10;
     const struct fit_settings *settings;

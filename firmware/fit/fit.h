@@ -35,24 +35,24 @@ enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count
  *
  * pressure_Pa_q10[sensor]: pressure on the pad, 1/1024 Pa, any bits. usable: bitmap of the sensors to use. With fewer
  * than four (of an array on a line, three), or no positive reading, FIT_VALID stays off. */
-void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, const struct fit_settings *settings,
                   struct fit_result *result);
 
 /* The same without the general kernel, so that an image does not hold it. */
-void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
-                       struct fit_result *result);
+void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
+                       const struct fit_settings *settings, struct fit_result *result);
 
 /* fit_gaussian and fit_gaussian_grid for frames that follow each other. */
-void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
                          const struct fit_settings *settings, struct fit_watch *watch, struct fit_result *result);
-void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
                               const struct fit_settings *settings, struct fit_watch *watch, struct fit_result *result);
 
 /* fit_gaussian_grid without the search for an outlier, and also without the kernel for full rectangles: 11 kB less
  * code, 18 000 cycles more for each fit with every sensor, and neither widths nor ELONGATED. */
-void fit_gaussian_grid_plain(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+void fit_gaussian_grid_plain(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
                              const struct fit_settings *settings, struct fit_result *result);
-void fit_gaussian_grid_small(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+void fit_gaussian_grid_small(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
                              const struct fit_settings *settings, struct fit_result *result);
 
 /* sqrt((a b)^2 + (c d)^2) within 0.1 %, for standard deviations: some 800 cycles less than in soft
@@ -68,7 +68,7 @@ float fit_quadrature(float a, float b, float c, float d);
  * settled with residuals that look like an outlier: rough, and more than noise, gains and model explain. */
 bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
               struct fit_result *result);
-bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, const struct fit_settings *settings,
                      struct fit_result *result);
-void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, const struct fit_settings *settings,
                  struct fit_result *result);

@@ -40,7 +40,7 @@ static void find_grid(struct fit_array *made, const float *x_mm, const float *y_
   if (columns < 2 || rows < 2 || columns * rows != made->sensor_count) {
     return;
   }
-  uint32_t seen = 0;
+  sensor_map seen = 0;
   for (uint8_t k = 0; k < made->sensor_count; k++) {
     int column = node_at(made->x[k], x_first);
     int row = node_at(made->y[k], y_first);
@@ -48,10 +48,10 @@ static void find_grid(struct fit_array *made, const float *x_mm, const float *y_
       return;
     }
     grid->sensor[column * rows + row] = k;
-    seen |= UINT32_C(1) << (column * rows + row);
+    seen |= sensor_bit((unsigned)(column * rows + row));
   }
   /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */
-  if (seen != UINT32_MAX >> (FT_MAX_SENSORS - made->sensor_count)) {
+  if (seen != first_sensors(made->sensor_count)) {
     return;
   }
   const int32_t half_q26 = 1 << 25;

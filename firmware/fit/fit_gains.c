@@ -58,7 +58,7 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array, con
   const bool rests = fabsf(p0_Pa - gains->p0_Pa) <= REST_SHARE * p0_Pa;
   gains->p0_Pa = p0_Pa;
   if (gains->counted || !rests || array->is_line || count < SENSORS_LEAST || !(result->flags & CONTACT_FLAG_FIT_VALID) ||
-      (result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT)) || result->used != (UINT32_C(1) << count) - 1u || width < WIDTH_LEAST ||
+      (result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT)) || result->used != first_sensors(count) || width < WIDTH_LEAST ||
       width > WIDTH_MOST) {
     return false;
   }

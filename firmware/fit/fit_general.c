@@ -255,10 +255,10 @@ static bool at_bound(const struct fit_array *array, const struct parameters *the
          theta->sigma <= FIT_SIGMA_MIN || theta->sigma >= FIT_SIGMA_MAX || theta->p0 <= P0_MIN || theta->p0 >= P0_MAX;
 }
 
-static int32_t largest_reading(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable) {
+static int32_t largest_reading(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable) {
   int32_t largest = 0;
   for (uint8_t k = 0; k < array->sensor_count; k++) {
-    if ((usable & UINT32_C(1) << k) && pressure_Pa_q10[k] > largest) {
+    if ((usable & sensor_bit(k)) && pressure_Pa_q10[k] > largest) {
       largest = pressure_Pa_q10[k];
     }
   }
@@ -413,7 +413,7 @@ struct solution {
   bool deficient;                  /* the readings do not determine a direction */
 };
 
-static void take_samples(const int32_t *pressure_Pa_q10, uint32_t usable, struct problem *problem) {
+static void take_samples(const int32_t *pressure_Pa_q10, sensor_map usable, struct problem *problem) {
   const struct fit_array *array = problem->array;
   const struct fit_settings *settings = problem->settings;
   const float scale = problem->scale;
@@ -425,7 +425,7 @@ static void take_samples(const int32_t *pressure_Pa_q10, uint32_t usable, struct
   problem->peak = 0;
   problem->sum_squares = 0.0f;
   for (uint8_t k = 0; k < array->sensor_count; k++) {
-    if (!(usable & UINT32_C(1) << k)) {
+    if (!(usable & sensor_bit(k))) {
       continue;
     }
     int n = samples->count++;
@@ -557,11 +557,11 @@ static bool set_errors(const struct problem *problem, const struct solution *sol
 
 /* Whether the fit has settled with residuals that are rough and no noise; then outlier is the
  * sensor that does not belong to the others, or -1. */
-static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, const struct fit_settings *settings,
                      struct fit_result *result, int *outlier) {
   memset(result, 0, sizeof *result);
   *outlier = -1;
-  uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
+  sensor_map all = first_sensors(array->sensor_count);
   usable &= all;
   if (usable != all) {
     result->flags |= CONTACT_FLAG_SENSOR_MASKED;
@@ -601,7 +601,7 @@ static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q
   return true;
 }
 
-void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, const struct fit_settings *settings,
                  struct fit_result *result) {
   int outlier;
   fit_once(array, pressure_Pa_q10, usable, settings, result, &outlier);
@@ -609,7 +609,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
     return;
   }
   struct fit_result without;
-  usable &= ~(UINT32_C(1) << outlier);
+  usable &= ~sensor_bit((unsigned)outlier);
   bool rough = fit_once(array, pressure_Pa_q10, usable, settings, &without, &outlier);
   if (fit_outlier_gone(settings, result, &without, rough, array->pitch_mm)) {
     *result = without;

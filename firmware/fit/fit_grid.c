@@ -568,7 +568,7 @@ static NOINLINE void take_out(const struct fit_array *array, const int32_t *pres
   }
   if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
     const int32_t peak_q28 = fit_grid_peak(system->amplitude_q28, rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
-    fit_grid_take_own_out(array, settings, UINT32_MAX, state, peak_q28, readings);
+    fit_grid_take_own_out(array, settings, ~(sensor_map)0, state, peak_q28, readings);
   }
 }
 
@@ -580,7 +580,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, con
   struct moments m;
   struct fit_system system;
   struct state state;
-  if (!fit_grid_take_readings(array, pressure_Pa_q10, UINT32_MAX, settings, &readings)) {
+  if (!fit_grid_take_readings(array, pressure_Pa_q10, ~(sensor_map)0, settings, &readings)) {
     memset(result, 0, sizeof *result);
     result->flags = CONTACT_FLAG_LOW_SIGNAL;
     return false;
@@ -603,7 +603,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, con
     left--;
   } while (left > 0);
   result->flags = 0;
-  result->used = UINT32_MAX >> (FT_MAX_SENSORS - NODES);
+  result->used = first_sensors((unsigned)NODES);
   result->sigma_x_mm = result->sigma_y_mm = result->width_correlation = 0.0f;
   finish(&readings, &m, &system);
   struct fit_spread spread;

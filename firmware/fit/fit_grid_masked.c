@@ -640,7 +640,7 @@ static NOINLINE void evaluate(const struct readings *readings, enum accuracy acc
 }
 
 /* Readings in use, which sensors are not (in their residual's place), and how many are. False: nothing to fit. */
-static bool gather(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+static bool gather(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, const struct fit_settings *settings,
                    struct readings *readings, int *count) {
   *count = 0;
   for (int k = 0; k < NODES; k++) {
@@ -651,14 +651,14 @@ static bool gather(const struct fit_array *array, const int32_t *pressure_Pa_q10
   return fit_grid_take_readings(array, pressure_Pa_q10, usable, settings, readings);
 }
 
-bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, const struct fit_settings *settings,
                      struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
   fit_use_rectangle(grid);
   struct readings readings;
   int count;
   memset(result, 0, sizeof *result);
-  usable &= UINT32_MAX >> (FT_MAX_SENSORS - NODES);
+  usable &= first_sensors((unsigned)NODES);
   bool positive = gather(array, pressure_Pa_q10, usable, settings, &readings, &count);
   if (count < NODES) {
     result->flags = CONTACT_FLAG_SENSOR_MASKED;
@@ -711,7 +711,7 @@ static int32_t share_of(int32_t value, int32_t sum, int32_t sum_shift) {
   return port_divide((value * value) >> sum_shift, (sum >> 15) + 1);
 }
 
-int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, const struct fit_settings *settings,
                      const struct fit_result *result) {
   const struct fit_grid_shape *grid = &array->grid;
   fit_use_rectangle(grid);

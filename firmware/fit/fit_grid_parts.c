@@ -43,7 +43,7 @@ FIXED_INLINE void set_reading(struct readings *readings, int k, int32_t value, i
   readings->q14[k] = (value + (1 << 13)) >> 14;
 }
 
-bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
                             const struct fit_settings *settings, struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   int32_t largest = 0;
@@ -83,7 +83,7 @@ bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressu
   return true;
 }
 
-int fit_grid_weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used, const struct readings *readings,
+int fit_grid_weigh(const struct fit_array *array, const struct fit_settings *settings, sensor_map used, const struct readings *readings,
                    int32_t noise_most, int32_t model_sd_q16, int32_t *weight_q12, struct fit_base *base) {
   int32_t noise = fixed_clamp(shifted(settings->noise_Pa_q10, readings->shift - 6), 1, noise_most);
   int32_t of_one = fixed_longer_leg(noise, ((readings->largest_q28 >> 14) * model_sd_q16) >> 8);
@@ -176,7 +176,7 @@ static NOINLINE void set_own_axis(int32_t nodes, int32_t centre, int32_t height,
 
 /* A Gaussian that is wider by b and whose sensor is off by o is, d from the contact to its place in
  * the array, larger by (b d - o)' d / sigma^2 of itself. */
-void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, uint32_t usable, const struct state *at,
+void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, sensor_map usable, const struct state *at,
                            int32_t peak_q28, struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   struct own_axis x, y;
@@ -199,7 +199,7 @@ void fit_grid_take_own_out(const struct fit_array *array, const struct fit_setti
   }
 }
 
-void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, struct readings *readings) {
+void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, struct readings *readings) {
   const uint8_t *sensor = array->grid.sensor;
   for (int k = 0; k < NODES; k++) {
     if (usable >> sensor[k] & 1) {

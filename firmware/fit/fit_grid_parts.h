@@ -122,7 +122,7 @@ int32_t fit_scaled_to_fixed(struct scaled a, int32_t q);
 FIXED_INLINE float fit_scaled_float(struct scaled a) { return fit_float(a.mantissa, a.exponent); }
 
 /* usable: bitmap of the sensors, of which those left out read 0. False: nothing positive. */
-bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable,
+bool fit_grid_take_readings(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
                             const struct fit_settings *settings, struct readings *readings);
 
 /* The dip's Gaussian, a product as the contact's is: its factors at the nodes, Q30. */
@@ -143,7 +143,7 @@ int32_t fit_grid_peak(int32_t amplitude_q28, int32_t rise_q22, struct scaled sha
 
 /* Corrects the readings of the usable sensors by what is their own (fit_settings), about a contact of this peak. */
 #define FIT_OWN_PEAK_MAX_Q28 (1 << 30)
-void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, uint32_t usable, const struct state *at,
+void fit_grid_take_own_out(const struct fit_array *array, const struct fit_settings *settings, sensor_map usable, const struct state *at,
                            int32_t peak_q28, struct readings *readings);
 
 /* The errors of the readings of the sensors in use, units of Q22: base of one of weight 1, by the noise, held to noise_most, and a share
@@ -152,7 +152,7 @@ struct fit_base {
   int32_t noise_q22, base_q22;
   int32_t squares_q12; /* sum of those of the weights */
 };
-int fit_grid_weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used, const struct readings *readings,
+int fit_grid_weigh(const struct fit_array *array, const struct fit_settings *settings, sensor_map used, const struct readings *readings,
                    int32_t noise_most, int32_t model_sd_q16, int32_t *weight_q12, struct fit_base *base);
 
 /* Sum of the readings, Q20. Of those that are a contact's the largest is 0.5 to 1, and the sum FIT_SUM_LEAST_Q20 and more. */
@@ -165,7 +165,7 @@ FIXED_INLINE bool fit_is_another(int32_t sum_q20, int32_t before_q20) {
 }
 
 /* Readings below zero as they are, where fit_grid_take_readings took them as zero. */
-void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, struct readings *readings);
+void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, struct readings *readings);
 
 /* value >= 0 and finite. */
 uint64_t fit_packed_float(float value);

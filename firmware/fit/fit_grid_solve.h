@@ -137,5 +137,5 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
                        struct fit_result *result);
 
 /* The sensor whose reading does not belong to the others', or -1; result: the fit to them all. */
-int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, const struct fit_settings *settings,
+int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, const struct fit_settings *settings,
                      const struct fit_result *result);

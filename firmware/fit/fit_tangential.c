@@ -128,7 +128,7 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, 
 }
 
 /* False: too few sensors. */
-static bool weigh(const struct fit_array *array, const struct fit_settings *settings, uint32_t used, struct problem *problem,
+static bool weigh(const struct fit_array *array, const struct fit_settings *settings, sensor_map used, struct problem *problem,
                   struct fit_tangential_room *room) {
   int sensors =
       fit_grid_weigh(array, settings, used, &problem->readings, ONE_Q26 >> 5, problem->model_sd_q16, room->weight_q12, &problem->base);

@@ -90,7 +90,7 @@ struct fit_result {
   float force_sd_N;
   float sigma_x_mm, sigma_y_mm; /* WIDTHS_VALID: of an elliptic Gaussian, along the axes */
   float width_correlation;      /* and its correlation, -1..1: 0 unless it lies aslant */
-  uint32_t used;                /* bitmap of the sensors that entered */
+  sensor_map used;              /* bitmap of the sensors that entered */
   uint32_t flags;               /* of enum contact_flag: FIT_VALID, UNCERTAINTY_VALID, LOW_SIGNAL, FLAT,
                                    UNCERTAIN, MODEL, AT_BOUND, SENSOR_MASKED, WIDTHS_VALID, ELONGATED */
 };
@@ -102,9 +102,9 @@ struct fit_result {
 #define FIT_WATCH_FRAMES 128
 #define FIT_WATCH_LEAST 8
 struct fit_watch {
-  uint32_t usable;   /* of these sensors */
-  uint32_t left_out; /* bitmap of at most one */
-  uint16_t frames;   /* that it is still kept for */
+  sensor_map usable;   /* of these sensors */
+  sensor_map left_out; /* bitmap of at most one */
+  uint16_t frames;     /* that it is still kept for */
   float residual_rms_Pa, force_N;
   struct fit_result without; /* room of a search */
 };

@@ -19,11 +19,11 @@ struct frame {
   uint8_t sensor_count;                    /* 1..FT_MAX_SENSORS */
   int32_t noise_Pa_q10;                    /* rms noise of a reading at this conversion's OSR, 1/1024 Pa */
   int16_t temperature_cC;                  /* mean of the sensors, 0.01 degC; 0 until first measured */
-  uint32_t renewed;                        /* bitmap: another sensor than in the frame before, with another zero */
-  uint32_t restored;                       /* bitmap: a reset brought back its state, or it stepped alone, since the frame before */
-  uint32_t valid;                          /* bitmap: pressure is a measurement */
-  uint32_t doubtful;                       /* bitmap: valid, but there is reason to doubt the reading */
-  uint32_t unsettled;                      /* bitmap: doubtful until the next temperature settles it */
-  uint32_t saturated;                      /* bitmap: beyond the range in which the sensor reads true */
+  sensor_map renewed;                      /* bitmap: another sensor than in the frame before, with another zero */
+  sensor_map restored;                     /* bitmap: a reset brought back its state, or it stepped alone, since the frame before */
+  sensor_map valid;                        /* bitmap: pressure is a measurement */
+  sensor_map doubtful;                     /* bitmap: valid, but there is reason to doubt the reading */
+  sensor_map unsettled;                    /* bitmap: doubtful until the next temperature settles it */
+  sensor_map saturated;                    /* bitmap: beyond the range in which the sensor reads true */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor]; 0 where not valid */
 };

@@ -9,11 +9,6 @@
 #define INTERVAL_MAX_us 8000000u
 #define PASSES 3
 
-static uint32_t all_sensors(const struct bring_up *bring_up) {
-  /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */
-  return UINT32_MAX >> (FT_MAX_SENSORS - bring_up->sensor_count);
-}
-
 void bring_up_init(struct bring_up *bring_up, uint8_t sensor_count) {
   memset(bring_up, 0, sizeof *bring_up);
   bring_up->sensor_count = sensor_count;
@@ -30,8 +25,8 @@ void bring_up_begin(struct bring_up *bring_up, bool of_suspects, uint64_t now_us
   bring_up->good = 0;
 }
 
-void bring_up_take_reset(struct bring_up *bring_up, uint32_t acknowledged) {
-  bring_up->heard = acknowledged & all_sensors(bring_up);
+void bring_up_take_reset(struct bring_up *bring_up, sensor_map acknowledged) {
+  bring_up->heard = acknowledged & first_sensors(bring_up->sensor_count);
   bring_up->answered = bring_up->heard;
 }
 
@@ -39,7 +34,7 @@ void bring_up_take_reset(struct bring_up *bring_up, uint32_t acknowledged) {
 static void use_prom(struct bring_up *bring_up, uint8_t k) {
   if (memcmp(&bring_up->prom[k], &bring_up->read[k], sizeof bring_up->prom[k]) != 0) {
     bring_up->prom[k] = bring_up->read[k];
-    bring_up->changed |= UINT32_C(1) << k;
+    bring_up->changed |= sensor_bit(k);
   }
 }
 
@@ -48,7 +43,7 @@ static void judge_pass(struct bring_up *bring_up) {
   bring_up->differs = 0;
   bring_up->blank = 0;
   for (uint8_t k = 0; k < bring_up->sensor_count; k++) {
-    uint32_t bit = UINT32_C(1) << k;
+    sensor_map bit = sensor_bit(k);
     if (!(bring_up->answered & bit) || (bring_up->good & bit)) {
       continue;
     }
@@ -76,7 +71,7 @@ bool bring_up_take_word(struct bring_up *bring_up, const struct array_bus_result
   judge_pass(bring_up);
   bring_up->pass++;
   bring_up->word = 0;
-  if (bring_up->good == all_sensors(bring_up) || bring_up->pass >= PASSES) {
+  if (bring_up->good == first_sensors(bring_up->sensor_count) || bring_up->pass >= PASSES) {
     return false;
   }
   bring_up->answered = bring_up->heard;
@@ -89,9 +84,9 @@ struct bring_up_result bring_up_end(struct bring_up *bring_up, uint64_t now_us) 
       use_prom(bring_up, k);
     }
   }
-  const uint32_t admitted = bring_up->good | bring_up->differs;
+  const sensor_map admitted = bring_up->good | bring_up->differs;
   bring_up->rechecks = bring_up->differs == 0 ? 0 : (uint8_t)(bring_up->rechecks + (bring_up->rechecks <= BRING_UP_RECHECKS));
-  if (admitted == all_sensors(bring_up) && !bring_up->of_suspects && !bring_up_wants_recheck(bring_up)) {
+  if (admitted == first_sensors(bring_up->sensor_count) && !bring_up->of_suspects && !bring_up_wants_recheck(bring_up)) {
     bring_up->next_us = now_us + REST * (now_us - bring_up->began_us);
     bring_up->interval_us = INTERVAL_MIN_us;
   } else if (bring_up->interval_us < INTERVAL_MAX_us) {

@@ -19,15 +19,15 @@
 
 struct bring_up {
   uint8_t sensor_count;
-  uint8_t word, pass; /* of the PROM, to be read next */
-  bool of_suspects;   /* this one was asked for by the main context */
-  uint32_t heard;     /* bitmap: the reset was acknowledged, by the sensor or its branch */
-  uint32_t answered;  /* bitmap: every word of this pass */
-  uint32_t good;      /* bitmap: in some pass of this one */
-  uint32_t differs;   /* bitmap: the CRC does, in the last pass */
-  uint32_t blank;     /* bitmap: the PROM is blank, in the last pass */
-  uint8_t rechecks;   /* admissions in a row after which a CRC differed */
-  uint32_t changed;   /* bitmap: another PROM than before; cleared once reported */
+  uint8_t word, pass;  /* of the PROM, to be read next */
+  bool of_suspects;    /* this one was asked for by the main context */
+  sensor_map heard;    /* bitmap: the reset was acknowledged, by the sensor or its branch */
+  sensor_map answered; /* bitmap: every word of this pass */
+  sensor_map good;     /* bitmap: in some pass of this one */
+  sensor_map differs;  /* bitmap: the CRC does, in the last pass */
+  sensor_map blank;    /* bitmap: the PROM is blank, in the last pass */
+  uint8_t rechecks;    /* admissions in a row after which a CRC differed */
+  sensor_map changed;  /* bitmap: another PROM than before; cleared once reported */
   uint64_t began_us;
   uint64_t interval_us;
   uint64_t next_us;                        /* the next one not before */
@@ -36,8 +36,8 @@ struct bring_up {
 };
 
 struct bring_up_result {
-  uint32_t admitted; /* bitmap */
-  uint32_t bad;      /* bitmap: the CRC differs, or the PROM is blank */
+  sensor_map admitted; /* bitmap */
+  sensor_map bad;      /* bitmap: the CRC differs, or the PROM is blank */
 };
 
 void bring_up_init(struct bring_up *bring_up, uint8_t sensor_count);
@@ -46,7 +46,7 @@ void bring_up_init(struct bring_up *bring_up, uint8_t sensor_count);
 void bring_up_begin(struct bring_up *bring_up, bool of_suspects, uint64_t now_us);
 
 /* Bitmap of the sensors that acknowledged the reset. One that did not may still be in its bad state. */
-void bring_up_take_reset(struct bring_up *bring_up, uint32_t acknowledged);
+void bring_up_take_reset(struct bring_up *bring_up, sensor_map acknowledged);
 
 /* Takes the result of the last word. True: read .word next. False: that was the last; see
  * bring_up_end. The last word of a pass costs some 20 000 Cortex-M0+ cycles. */

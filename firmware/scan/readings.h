@@ -65,41 +65,41 @@ struct readings {
   uint64_t t_us;          /* of the last frame */
   int16_t temperature_cC; /* mean of the sensors admitted, the last one if there is none */
   uint8_t doubts_in_a_row;
-  uint32_t has_thermal;    /* bitmap */
-  uint32_t renewed;        /* bitmap: another sensor since the last frame */
-  uint32_t restored;       /* bitmap: since the last frame, as in frame.h */
-  uint32_t doubted;        /* bitmap: the last temperature was not used */
-  uint32_t strange;        /* bitmap: a temperature that is not near the others' is in use */
-  uint32_t unproven;       /* bitmap: the PROM's CRC differs and the sensor has not read like others */
-  uint32_t was_near;       /* bitmap: an unproven one did, at the last temperature */
-  uint32_t doubtful;       /* bitmap: used, and to be flagged */
-  uint32_t has_last;       /* bitmap: last_Pa_q10 holds a reading */
-  uint32_t counted;        /* bitmap: and was in the last frame */
-  uint32_t awaited;        /* bitmap: last_Pa_q10 is of before a reset */
+  sensor_map has_thermal;  /* bitmap */
+  sensor_map renewed;      /* bitmap: another sensor since the last frame */
+  sensor_map restored;     /* bitmap: since the last frame, as in frame.h */
+  sensor_map doubted;      /* bitmap: the last temperature was not used */
+  sensor_map strange;      /* bitmap: a temperature that is not near the others' is in use */
+  sensor_map unproven;     /* bitmap: the PROM's CRC differs and the sensor has not read like others */
+  sensor_map was_near;     /* bitmap: an unproven one did, at the last temperature */
+  sensor_map doubtful;     /* bitmap: used, and to be flagged */
+  sensor_map has_last;     /* bitmap: last_Pa_q10 holds a reading */
+  sensor_map counted;      /* bitmap: and was in the last frame */
+  sensor_map awaited;      /* bitmap: last_Pa_q10 is of before a reset */
   uint32_t last_sum;       /* of the pressures of the last frame, modulo 2^32 */
-  uint32_t was_low;        /* bitmap: the last pressure was below zero */
-  uint32_t alone;          /* bitmap of one sensor: its last pressure stepped alone, ... */
+  sensor_map was_low;      /* bitmap: the last pressure was below zero */
+  sensor_map alone;        /* bitmap of one sensor: its last pressure stepped alone, ... */
   int32_t alone_to_Pa_q10; /* ... from last_Pa_q10 to here */
-  uint32_t suspects;       /* bitmap: want a reset */
-  uint32_t jolted;         /* bitmap: doubtful until their temperature shows that they kept their state */
-  uint32_t zero;           /* bitmap: of those, left out */
-  uint32_t reset_once;     /* bitmap: had one for that reason */
-  uint32_t pardoned;       /* bitmap: and another one */
+  sensor_map suspects;     /* bitmap: want a reset */
+  sensor_map jolted;       /* bitmap: doubtful until their temperature shows that they kept their state */
+  sensor_map zero;         /* bitmap: of those, left out */
+  sensor_map reset_once;   /* bitmap: had one for that reason */
+  sensor_map pardoned;     /* bitmap: and another one */
   uint32_t left_out;       /* since start: pressures below zero or that stepped alone */
-  uint32_t alike;          /* bitmap: has read the others' temperature since it came */
-  uint32_t was_alike;      /* bitmap: at the last temperature */
-  uint32_t apart;          /* bitmap: see readings_doubt() */
+  sensor_map alike;        /* bitmap: has read the others' temperature since it came */
+  sensor_map was_alike;    /* bitmap: at the last temperature */
+  sensor_map apart;        /* bitmap: see readings_doubt() */
 };
 
 /* What a conversion of the temperature brought. */
 struct readings_temperature {
   const struct ms58xx_prom *prom; /* [sensor] */
   const uint32_t *code;           /* [sensor] */
-  uint32_t good;                  /* bitmap: the code is a measurement */
-  uint32_t prom_changed;          /* bitmap: another sensor than before */
-  uint32_t returned;              /* bitmap: was reset, perhaps after long */
-  uint32_t prom_bad;              /* bitmap: the CRC differs */
-  uint32_t admitted;              /* bitmap */
+  sensor_map good;                /* bitmap: the code is a measurement */
+  sensor_map prom_changed;        /* bitmap: another sensor than before */
+  sensor_map returned;            /* bitmap: was reset, perhaps after long */
+  sensor_map prom_bad;            /* bitmap: the CRC differs */
+  sensor_map admitted;            /* bitmap */
   bool is_late;                   /* long after the one before */
 };
 
@@ -113,8 +113,8 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
 
 /* These are apart from the others at rest (condition/plausibility.h), and are doubtful until a call states
  * otherwise. That takes effect with the next temperature; a new doubt does so at once. */
-void readings_doubt(struct readings *readings, uint32_t apart);
+void readings_doubt(struct readings *readings, sensor_map apart);
 
 /* Fills in pressures, valid, doubtful, unsettled, saturated, renewed and restored. code: [sensor];
  * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost: some 140 Cortex-M0+ cycles a sensor. */
-bool readings_take_pressures(struct readings *readings, const uint32_t code[], uint32_t good, struct frame *frame);
+bool readings_take_pressures(struct readings *readings, const uint32_t code[], sensor_map good, struct frame *frame);

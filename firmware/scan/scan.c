@@ -31,14 +31,9 @@
 #define TORN_BYTE_SENSORS 4u
 #define CODE_MAX 0xFFFFFFu
 
-static void count(_Atomic uint32_t *counter, uint32_t amount) {
-  uint32_t value = atomic_load_explicit(counter, memory_order_relaxed);
-  atomic_store_explicit(counter, value + amount, memory_order_relaxed);
-}
-
-static uint32_t get(const _Atomic uint32_t *value) { return atomic_load_explicit(value, memory_order_relaxed); }
-
 static void set(_Atomic uint32_t *to, uint32_t value) { atomic_store_explicit(to, value, memory_order_relaxed); }
+
+static void count(_Atomic uint32_t *counter, uint32_t amount) { set(counter, scan_read(counter) + amount); }
 
 /* An interrupt and what it interrupts share one core: the compiler alone must keep the order. */
 static void hand_over(_Atomic uint32_t *state, enum scan_slot_state to) {
@@ -47,19 +42,6 @@ static void hand_over(_Atomic uint32_t *state, enum scan_slot_state to) {
 }
 
 static const struct ms58xx_osr *get_osr(const struct scan *scan) { return atomic_load_explicit(&scan->osr, memory_order_relaxed); }
-
-static uint32_t all_sensors(const struct scan *scan) {
-  /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */
-  return UINT32_MAX >> (FT_MAX_SENSORS - scan->sensor_count);
-}
-
-static uint32_t count_bits(uint32_t bitmap) {
-  uint32_t bits = 0;
-  for (; bitmap; bitmap &= bitmap - 1) {
-    bits++;
-  }
-  return bits;
-}
 
 enum ft_status scan_init(struct scan *scan, const struct array_bus *bus, const struct scan_settings *settings) {
   if (settings->sensor_count < 1 || settings->sensor_count > FT_MAX_SENSORS || !ms58xx_find_osr(settings->osr)) {
@@ -113,8 +95,8 @@ static void convert(struct scan *scan, bool is_temperature, bool is_frame) {
 }
 
 static void begin_bring_up(struct scan *scan, uint64_t now_us) {
-  const uint32_t admitted = get(&scan->admitted);
-  const uint32_t suspects = get(&scan->suspects) & admitted;
+  const sensor_map admitted = scan_read(&scan->admitted);
+  const sensor_map suspects = scan_read(&scan->suspects) & admitted;
   set(&scan->admitted, admitted & ~suspects);
   bring_up_begin(&scan->bring_up, suspects != 0, now_us);
   enter(scan, SCAN_RESET);
@@ -122,7 +104,7 @@ static void begin_bring_up(struct scan *scan, uint64_t now_us) {
 
 static void end_bring_up(struct scan *scan, uint64_t now_us) {
   const struct bring_up_result result = bring_up_end(&scan->bring_up, now_us);
-  scan->returned |= result.admitted & ~get(&scan->admitted);
+  scan->returned |= result.admitted & ~scan_read(&scan->admitted);
   set(&scan->admitted, result.admitted);
   set(&scan->prom_bad, result.bad);
   set(&scan->temperature_within_us, 0); /* the next conversion is one */
@@ -137,22 +119,22 @@ static void end_bring_up(struct scan *scan, uint64_t now_us) {
 /* Where the codes of this conversion go; NULL while the main context reads the last ones. */
 static struct scan_slot *slot_for(struct scan *scan, const struct scan_conversion *conversion) {
   if (conversion->is_temperature) {
-    return get(&scan->temperature_state) == SCAN_SLOT_EMPTY ? &scan->temperature_slot : NULL;
+    return scan_read(&scan->temperature_state) == SCAN_SLOT_EMPTY ? &scan->temperature_slot : NULL;
   }
-  return get(&scan->slot_state) == SCAN_SLOT_CLAIMED ? NULL : &scan->slot;
+  return scan_read(&scan->slot_state) == SCAN_SLOT_CLAIMED ? NULL : &scan->slot;
 }
 
 static bool is_near(uint32_t code, uint32_t last) { return code - last + TORN_TOLERANCE <= 2 * TORN_TOLERANCE; }
 
 /* Judges what came of the last conversion of each sensor, for its admission and for the next
  * reading. Returns the bitmap of those whose reading counts, if its code does. */
-static uint32_t judge_answers(struct scan *scan, uint32_t heard, uint32_t zero) {
+static sensor_map judge_answers(struct scan *scan, sensor_map heard, sensor_map zero) {
   const bool single = scan->bus->answers_are_single;
-  const uint32_t acknowledged = scan->result.acknowledged & all_sensors(scan);
-  uint32_t admitted = get(&scan->admitted);
-  const uint32_t answered = admitted & acknowledged & heard;
-  const uint32_t missed = admitted & ~answered;
-  const uint32_t unusable = answered & (zero | scan->void_next);
+  const sensor_map acknowledged = scan->result.acknowledged & first_sensors(scan->sensor_count);
+  sensor_map admitted = scan_read(&scan->admitted);
+  const sensor_map answered = admitted & acknowledged & heard;
+  const sensor_map missed = admitted & ~answered;
+  const sensor_map unusable = answered & (zero | scan->void_next);
   zero &= answered;
   admitted &= ~(missed & scan->missed_twice); /* the third in a row */
   admitted &= ~(single ? zero : zero & scan->was_zero);
@@ -162,18 +144,18 @@ static uint32_t judge_answers(struct scan *scan, uint32_t heard, uint32_t zero) 
   /* What was not read is still there to be read, and the sensor may miss the next command. */
   scan->void_next = single ? 0 : zero | (missed & ~acknowledged);
   scan->wants_admission = (acknowledged & ~admitted) != 0 || admitted == 0 || bring_up_wants_recheck(&scan->bring_up);
-  count(&scan->counters.zero_readings, count_bits(unusable));
+  count(&scan->counters.zero_readings, count_sensors(unusable));
   set(&scan->present, acknowledged);
   set(&scan->admitted, admitted);
   return answered & ~unusable;
 }
 
 /* Judges the codes in scan->result. Returns the bitmap of those that are measurements. */
-static uint32_t take_codes(struct scan *scan, const struct scan_conversion *conversion, uint32_t codes[]) {
-  uint32_t zero = 0;
-  uint32_t torn = 0;
-  uint32_t ends_in_ones = 0;
-  uint32_t bit = 1;
+static sensor_map take_codes(struct scan *scan, const struct scan_conversion *conversion, uint32_t codes[]) {
+  sensor_map zero = 0;
+  sensor_map torn = 0;
+  sensor_map ends_in_ones = 0;
+  sensor_map bit = 1;
   const uint8_t(*bytes)[ARRAY_BUS_MAX_READ_BYTES] = scan->result.bytes;
   for (int left = scan->sensor_count; left > 0; left--, bit <<= 1, bytes++) {
     uint32_t low = (*bytes)[2];
@@ -197,32 +179,32 @@ static uint32_t take_codes(struct scan *scan, const struct scan_conversion *conv
       *codes++ = code;
     }
   }
-  const uint32_t usable = judge_answers(scan, conversion->heard, zero);
+  const sensor_map usable = judge_answers(scan, conversion->heard, zero);
   ends_in_ones &= usable;
   torn &= usable;
-  if (ends_in_ones != 0 && count_bits(ends_in_ones) >= TORN_BYTE_SENSORS) {
+  if (ends_in_ones != 0 && count_sensors(ends_in_ones) >= TORN_BYTE_SENSORS) {
     torn |= ends_in_ones;
   }
   scan->void_next |= scan->bus->answers_are_single ? 0 : torn;
-  count(&scan->counters.bus_nacks, count_bits(torn));
+  count(&scan->counters.bus_nacks, count_sensors(torn));
   return usable & ~torn;
 }
 
 static void take_reading(struct scan *scan, const struct scan_conversion *conversion) {
   struct scan_slot *slot = slot_for(scan, conversion);
-  uint32_t good = take_codes(scan, conversion, slot ? slot->code : NULL);
+  sensor_map good = take_codes(scan, conversion, slot ? slot->code : NULL);
   scan->zero_seen |= scan->was_zero;
   if (conversion->is_frame) {
     count(&scan->counters.frames, 1);
-    if (good != all_sensors(scan)) {
+    if (good != first_sensors(scan->sensor_count)) {
       count(&scan->counters.frames_incomplete, 1);
     }
-    if (!slot || (!conversion->is_temperature && get(&scan->slot_state) == SCAN_SLOT_FULL)) {
+    if (!slot || (!conversion->is_temperature && scan_read(&scan->slot_state) == SCAN_SLOT_FULL)) {
       count(&scan->counters.frames_skipped, 1);
     }
   }
   if (conversion->is_temperature) {
-    if (!slot || good != get(&scan->admitted)) {
+    if (!slot || good != scan_read(&scan->admitted)) {
       scan->next_temperature_us = conversion->t_begin_us + TEMPERATURE_RETRY_us;
     }
   }
@@ -237,18 +219,18 @@ static void take_reading(struct scan *scan, const struct scan_conversion *conver
     scan->bring_up.changed = 0;
     scan->returned = 0;
   } else {
-    slot->zero = (get(&scan->slot_state) == SCAN_SLOT_FULL ? slot->zero : 0) | scan->zero_seen;
+    slot->zero = (scan_read(&scan->slot_state) == SCAN_SLOT_FULL ? slot->zero : 0) | scan->zero_seen;
     scan->zero_seen = 0;
   }
   hand_over(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state, SCAN_SLOT_FULL);
 }
 
-static bool temperature_waits(const struct scan *scan) { return get(&scan->temperature_state) != SCAN_SLOT_EMPTY; }
+static bool temperature_waits(const struct scan *scan) { return scan_read(&scan->temperature_state) != SCAN_SLOT_EMPTY; }
 
 static uint64_t earlier(uint64_t a, uint64_t b) { return a < b ? a : b; }
 
 static void obey_wish(struct scan *scan, uint64_t now_us) {
-  uint32_t within_us = get(&scan->temperature_within_us);
+  uint32_t within_us = scan_read(&scan->temperature_within_us);
   if (temperature_waits(scan) || within_us == 0) {
     return;
   }
@@ -268,7 +250,7 @@ static uint64_t temperature_in_pause_us(const struct scan *scan, uint64_t now_us
 
 /* Between two operations: true if none is to follow for now. */
 static bool rest(struct scan *scan, uint64_t now_us) {
-  const bool rests = get(&scan->must_rest) != 0;
+  const bool rests = scan_read(&scan->must_rest) != 0;
   set(&scan->rests, rests);
   if (rests) {
     scan->wait_until_us = now_us + REST_POLL_us;
@@ -283,13 +265,13 @@ static void leave_idle(struct scan *scan, uint64_t now_us) {
   }
   /* A temperature that was read just now still has to go into its slot. */
   bool prom_is_free = !temperature_waits(scan) && !scan->last_was_temperature;
-  const bool wants_admission = scan->wants_admission || (get(&scan->suspects) & get(&scan->admitted)) != 0;
+  const bool wants_admission = scan->wants_admission || (scan_read(&scan->suspects) & scan_read(&scan->admitted)) != 0;
   if (wants_admission && now_us >= scan->bring_up.next_us && prom_is_free) {
     begin_bring_up(scan, now_us);
     return;
   }
   obey_wish(scan, now_us);
-  uint32_t period_us = get(&scan->period_us);
+  uint32_t period_us = scan_read(&scan->period_us);
   if (period_us != 0) {
     if (scan->next_frame_us > now_us + period_us) {
       scan->next_frame_us = now_us; /* the rate was raised */
@@ -319,7 +301,7 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
     conversion->osr = get_osr(scan);
     conversion->t_begin_us = now_us;
     if (conversion->is_temperature) {
-      scan->next_temperature_us = now_us + get(&scan->temperature_interval_us);
+      scan->next_temperature_us = now_us + scan_read(&scan->temperature_interval_us);
     }
     return bus->start_command(
         bus->context, conversion->is_temperature ? conversion->osr->convert_temperature : conversion->osr->convert_pressure, now_us);
@@ -476,7 +458,7 @@ uint64_t scan_step(struct scan *scan, uint64_t now_us) {
 
 /* Sets when the next reading is wanted, if not as planned. */
 static void adapt_interval(struct scan *scan, uint32_t news) {
-  uint32_t interval_us = get(&scan->temperature_interval_us);
+  uint32_t interval_us = scan_read(&scan->temperature_interval_us);
   if (news != 0) {
     set(&scan->temperature_interval_us, TEMPERATURE_INTERVAL_us);
     set(&scan->temperature_within_us, news & READINGS_ASK_AGAIN ? TEMPERATURE_RETRY_us : TEMPERATURE_INTERVAL_us);
@@ -492,8 +474,8 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
       .good = slot->good,
       .prom_changed = slot->prom_changed,
       .returned = slot->returned,
-      .prom_bad = get(&scan->prom_bad),
-      .admitted = get(&scan->admitted),
+      .prom_bad = scan_read(&scan->prom_bad),
+      .admitted = scan_read(&scan->admitted),
       .is_late = slot->conversion.t_us - scan->temperature_us > TEMPERATURE_LATE_us,
   };
   scan->temperature_us = slot->conversion.t_us;
@@ -519,7 +501,7 @@ static void report(struct scan *scan) {
 }
 
 static bool claim(_Atomic uint32_t *state) {
-  if (get(state) != SCAN_SLOT_FULL) {
+  if (scan_read(state) != SCAN_SLOT_FULL) {
     return false;
   }
   set(state, SCAN_SLOT_CLAIMED);
@@ -556,7 +538,7 @@ bool scan_take(struct scan *scan, struct frame *frame) {
     return false;
   }
   fill_head(scan, &scan->slot.conversion, frame);
-  const uint32_t jolted = scan->readings.jolted;
+  const sensor_map jolted = scan->readings.jolted;
   scan->readings.zero = (scan->readings.zero & jolted) | scan->slot.zero;
   scan->readings.jolted |= scan->slot.zero;
   if (readings_take_pressures(&scan->readings, scan->slot.code, scan->slot.good, frame)) {

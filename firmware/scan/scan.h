@@ -49,7 +49,7 @@ struct scan_settings {
 #define SCAN_TEMPERATURE_INTERVAL_ms 500u
 #define SCAN_TEMPERATURE_INTERVAL_MAX_ms 2000u
 
-/* A counter or bitmap that the event context writes. */
+/* A counter or map that the event context writes. */
 static inline uint32_t scan_read(const _Atomic uint32_t *value) { return atomic_load_explicit(value, memory_order_relaxed); }
 
 /* Since start, modulo 2^32. Readable from any context. */
@@ -83,17 +83,17 @@ struct scan_conversion {
   bool is_temperature;
   bool is_frame; /* pressure, or a temperature in the place of one */
   uint32_t number;
-  uint32_t heard; /* bitmap: the command was acknowledged, by the sensor or its branch */
+  sensor_map heard; /* bitmap: the command was acknowledged, by the sensor or its branch */
   uint64_t t_us, t_begin_us, t_converted_us, t_read_us;
 };
 
 /* One set of codes on its way from the event context to the main context. */
 struct scan_slot {
   struct scan_conversion conversion;
-  uint32_t good;                 /* bitmap: the code is a measurement */
-  uint32_t zero;                 /* bitmap: has read 0 since the last one that was taken. Of a frame */
-  uint32_t prom_changed;         /* bitmap: another sensor than before. Of a temperature */
-  uint32_t returned;             /* bitmap: admitted again, perhaps after long. Of a temperature */
+  sensor_map good;               /* bitmap: the code is a measurement */
+  sensor_map zero;               /* bitmap: has read 0 since the last one that was taken. Of a frame */
+  sensor_map prom_changed;       /* bitmap: another sensor than before. Of a temperature */
+  sensor_map returned;           /* bitmap: admitted again, perhaps after long. Of a temperature */
   uint32_t code[FT_MAX_SENSORS]; /* [sensor] 24-bit */
 };
 
@@ -113,7 +113,7 @@ struct scan {
   _Atomic uint32_t temperature_interval_us; /* set by the main context */
   _Atomic uint32_t temperature_within_us;   /* if not 0, the next in less. Set while the slot of
                                                the temperature is claimed, reset while it is empty */
-  _Atomic uint32_t suspects;                /* bitmap: to be reset. Set by the main context */
+  _Atomic sensor_map suspects;              /* bitmap: to be reset. Set by the main context */
   _Atomic uint32_t must_rest;
 
   /* Event context only. */
@@ -130,12 +130,12 @@ struct scan {
   bool wants_admission; /* a sensor is there that is not admitted, or a suspect */
   uint64_t recovery_delay_us;
   uint32_t frame_number;
-  uint32_t void_next;    /* bitmap: the next reading does not count */
-  uint32_t was_zero;     /* bitmap: the last reading was 0 */
-  uint32_t zero_seen;    /* bitmap: one was, of either kind, since the slot of the frame was filled */
-  uint32_t missed_once;  /* bitmap: the last reading was not acknowledged, ... */
-  uint32_t missed_twice; /* ... nor the one before */
-  uint32_t returned;     /* bitmap: admitted, and was not before */
+  sensor_map void_next;    /* bitmap: the next reading does not count */
+  sensor_map was_zero;     /* bitmap: the last reading was 0 */
+  sensor_map zero_seen;    /* bitmap: one was, of either kind, since the slot of the frame was filled */
+  sensor_map missed_once;  /* bitmap: the last reading was not acknowledged, ... */
+  sensor_map missed_twice; /* ... nor the one before */
+  sensor_map returned;     /* bitmap: admitted, and was not before */
   struct array_bus_result result;
 
   /* Written by the event context while the slot of its kind is not claimed, read by the main
@@ -147,10 +147,10 @@ struct scan {
   struct bring_up bring_up; /* of which the main context reads prom */
 
   /* Written by the event context, readable from any. */
-  _Atomic uint32_t present;  /* bitmap: acknowledged at the last attempt */
-  _Atomic uint32_t admitted; /* bitmap */
-  _Atomic uint32_t rests;    /* as it must: nothing is under way on the bus */
-  _Atomic uint32_t prom_bad; /* bitmap: after all attempts its CRC differs, or it is blank */
+  _Atomic sensor_map present;  /* bitmap: acknowledged at the last attempt */
+  _Atomic sensor_map admitted; /* bitmap */
+  _Atomic uint32_t rests;      /* as it must: nothing is under way on the bus */
+  _Atomic sensor_map prom_bad; /* bitmap: after all attempts its CRC differs, or it is blank */
   struct scan_counters counters;
 
   /* Main context only. */

@@ -22,14 +22,14 @@ struct company {
   bool votes;
 };
 
-static struct company keep_company(const struct readings *readings, uint8_t sensor_count, uint32_t good, const int16_t now_cC[]) {
+static struct company keep_company(const struct readings *readings, uint8_t sensor_count, sensor_map good, const int16_t now_cC[]) {
   struct company company = {.votes = false};
   int32_t values[FT_MAX_SENSORS];
   int count = 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
-    if (readings->has_thermal & (UINT32_C(1) << k)) {
+    if (readings->has_thermal & sensor_bit(k)) {
       values[count++] = readings->thermal[k].first_order_cC;
-    } else if (good & (UINT32_C(1) << k)) {
+    } else if (good & sensor_bit(k)) {
       values[count++] = now_cC[k];
     }
   }
@@ -42,7 +42,7 @@ static struct company keep_company(const struct readings *readings, uint8_t sens
 
 /* Whether to use a temperature that something speaks against. */
 static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const struct company *company, bool is_late) {
-  uint32_t bit = UINT32_C(1) << k;
+  sensor_map bit = sensor_bit(k);
   bool possible = now_cC >= TEMPERATURE_MIN_cC && now_cC <= TEMPERATURE_MAX_cC;
   bool near = possible && (!company->votes || within(now_cC - company->middle_cC, READINGS_TEMPERATURE_NEAR_cC));
   bool agrees = (readings->doubted & bit) && within(now_cC - readings->doubted_cC[k], READINGS_TEMPERATURE_STEP_MAX_cC);
@@ -67,8 +67,8 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const s
   return true;
 }
 
-static void forget(struct readings *readings, uint32_t sensors) {
-  const uint32_t reset = readings->suspects & sensors;
+static void forget(struct readings *readings, sensor_map sensors) {
+  const sensor_map reset = readings->suspects & sensors;
   readings->restored |= reset & ~readings->jolted; /* before a jolt it had its state */
   readings->pardoned = (readings->pardoned & ~sensors) | (readings->reset_once & reset);
   readings->reset_once = (readings->reset_once & ~sensors) | reset;
@@ -91,14 +91,14 @@ static void prove(struct readings *readings, uint8_t sensor_count) {
   int32_t values[FT_MAX_SENSORS];
   int count = 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
-    if (readings->has_last & (UINT32_C(1) << k)) {
+    if (readings->has_last & sensor_bit(k)) {
       values[count++] = last_Pa_q10[k] / 2;
     }
   }
-  uint32_t near = 0;
+  sensor_map near = 0;
   const int32_t middle = count > 0 ? apart_median(values, count) : 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
-    const uint32_t bit = readings->unproven & readings->has_last & (UINT32_C(1) << k);
+    const sensor_map bit = readings->unproven & readings->has_last & sensor_bit(k);
     if (bit && within(last_Pa_q10[k] / 2 - middle, READINGS_APART_Pa_q10 / 2)) {
       near |= bit;
     }
@@ -108,7 +108,7 @@ static void prove(struct readings *readings, uint8_t sensor_count) {
 }
 
 /* Returns the bitmap of those apart that have not read like the others yet. Later they may be apart, as something warm may touch some. */
-static uint32_t compare(struct readings *readings, uint8_t sensor_count) {
+static sensor_map compare(struct readings *readings, uint8_t sensor_count) {
   if ((readings->has_thermal & ~readings->alike) == 0) {
     return 0;
   }
@@ -116,18 +116,18 @@ static uint32_t compare(struct readings *readings, uint8_t sensor_count) {
   for (uint8_t k = 0; k < sensor_count; k++) {
     values[k] = readings->thermal[k].first_order_cC;
   }
-  const uint32_t apart = apart_find(values, readings->has_thermal, sensor_count, READINGS_TEMPERATURE_APART_cC);
-  const uint32_t like = readings->has_thermal & ~apart;
+  const sensor_map apart = apart_find(values, readings->has_thermal, sensor_count, READINGS_TEMPERATURE_APART_cC);
+  const sensor_map like = readings->has_thermal & ~apart;
   readings->alike |= like & readings->was_alike;
   readings->was_alike = like;
   return apart & ~readings->alike;
 }
 
-static void average(struct readings *readings, uint8_t sensor_count, uint32_t admitted) {
+static void average(struct readings *readings, uint8_t sensor_count, sensor_map admitted) {
   int32_t sum_cC = 0;
   int32_t sensors = 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
-    if (readings->has_thermal & admitted & (UINT32_C(1) << k)) {
+    if (readings->has_thermal & admitted & sensor_bit(k)) {
       sum_cC += readings->thermal[k].temperature_cC;
       sensors++;
     }
@@ -138,12 +138,12 @@ static void average(struct readings *readings, uint8_t sensor_count, uint32_t ad
 }
 
 /* Whether any temperature needs more than a look at its own last one. */
-static bool is_unusual(const struct readings *readings, uint8_t sensor_count, uint32_t good, const int16_t now_cC[]) {
+static bool is_unusual(const struct readings *readings, uint8_t sensor_count, sensor_map good, const int16_t now_cC[]) {
   if (good & (~readings->has_thermal | readings->doubted | readings->strange)) {
     return true;
   }
   for (uint8_t k = 0; k < sensor_count; k++) {
-    if ((good & (UINT32_C(1) << k)) && !within(now_cC[k] - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_STEP_MAX_cC)) {
+    if ((good & sensor_bit(k)) && !within(now_cC[k] - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_STEP_MAX_cC)) {
       return true;
     }
   }
@@ -151,7 +151,7 @@ static bool is_unusual(const struct readings *readings, uint8_t sensor_count, ui
 }
 
 uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count, const struct readings_temperature *taken) {
-  const uint32_t fresh = taken->prom_changed | taken->returned;
+  const sensor_map fresh = taken->prom_changed | taken->returned;
   forget(readings, fresh | ~taken->admitted);
   readings->renewed |= taken->prom_changed;
   readings->unproven = (readings->unproven | fresh) & taken->prom_bad;
@@ -170,7 +170,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
   }
   uint32_t news = 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
-    const uint32_t bit = UINT32_C(1) << k;
+    const sensor_map bit = sensor_bit(k);
     if (!(taken->good & bit)) {
       continue;
     }
@@ -204,7 +204,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
   return news;
 }
 
-void readings_doubt(struct readings *readings, uint32_t apart) {
+void readings_doubt(struct readings *readings, sensor_map apart) {
   readings->apart = apart;
   readings->doubtful |= apart;
 }
