@@ -180,6 +180,7 @@ def judge_strips(firmware, source, here):
     columns = ((fast, "phantom_percent"), (slow, "phantom_percent"), (fast, "doubted_percent"))
     return {
         **{name: by_time(*column) for name, column in zip(names, columns)},
+        **{f"{name}_by_file": mean_of(*column) for name, column in zip(names, columns)},
         "holds_missed": sum(one["held_missed"] for one in judged) if judged else None,
         "strips": [
             {"recording": name, "part": part, "holds": len(strip.holds)}
