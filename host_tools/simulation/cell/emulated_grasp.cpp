@@ -41,9 +41,9 @@ enum Stream : std::uint64_t { LINE = 841, PAD = 842 };
 
 constexpr const char *FACE = "sphere15";
 constexpr double LAYER_mm = 12.0;
-constexpr double FRICTION = 0.65, FRICTION_FALLS = 0.5; // static, and by what share it falls
-constexpr double SLICE_s = 500e-6;                      // lockstep.mjs, by default
-constexpr std::uint64_t SEED = 1;                       // of pads and of the gripper's line
+constexpr double FRICTION = 0.65;  // static, before it falls
+constexpr double SLICE_s = 500e-6; // lockstep.mjs, by default
+constexpr std::uint64_t SEED = 1;  // of pads and of the gripper's line
 constexpr int CLOCK_EXCHANGES = 8;
 constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
@@ -145,7 +145,7 @@ struct EmulatedTrial {
 };
 
 // Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
-EmulatedTrial trial_of() {
+EmulatedTrial trial_of(double friction_falls) {
   EmulatedTrial trial;
   KindOfGrasp &grasp = trial.grasp;
   grasp.pads[0].friction = 1.03 * FRICTION;
@@ -157,7 +157,7 @@ EmulatedTrial trial_of() {
   grasp.waits_s = 0.05;
   grasp.lift_mm = 4.0;
   grasp.lift_s = 0.5;
-  grasp.events = {{Event::Kind::slick, grasp.lift_s + 0.1, 0.03, FRICTION_FALLS}};
+  grasp.events = {{Event::Kind::slick, grasp.lift_s + 0.1, 0.03, friction_falls}};
   grasp.ends_s = grasp.lift_s + 0.4;
   trial.gripper = gripper_mechanics(gripper_models().front().model);
   return trial;
@@ -384,10 +384,10 @@ void put_u32(std::size_t value) {
   put(&word, sizeof word);
 }
 
-int serve(const std::string &cache) {
+int serve(const std::string &cache, double friction_falls) {
   const Face face(FACE, LAYER_mm, cache);
   const pad_profile profile = pad::profile_over_own_sensors({LAYER_mm, 0.0, false});
-  const EmulatedTrial trial = trial_of();
+  const EmulatedTrial trial = trial_of(friction_falls);
   EmulatedGrasp grasp(trial, face, profile);
   Bytes bytes;
   while (!grasp.over()) {
@@ -419,7 +419,7 @@ int serve(const std::string &cache) {
   out["face"] = FACE;
   out["mass_kg"] = trial.grasp.mass_kg;
   out["friction"] = FRICTION;
-  out["friction_falls"] = FRICTION_FALLS;
+  out["friction_falls"] = friction_falls;
   out.update(grasp.summary());
   const std::string text = out.dump();
   put(text.data(), text.size());
@@ -434,10 +434,12 @@ int main(int argc, char **argv) {
                "a gripper and the controller. It is lifted, and its friction falls.",
                "fingertip_cell_emulated");
   std::string cache;
+  double friction_falls = 0.5;
+  app.add_option("--friction-falls", friction_falls, "By this share")->check(CLI::Range(0.0, 0.9))->capture_default_str();
   app.add_option("--cache", cache, "Folder of the contact tables")->required();
   CLI11_PARSE(app, argc, argv);
   try {
-    return fingertip::cell::serve(cache);
+    return fingertip::cell::serve(cache, friction_falls);
   } catch (const std::exception &error) {
     std::fprintf(stderr, "fingertip_cell_emulated: %s\n", error.what());
     return 1;
