@@ -15,7 +15,7 @@ sys.path.insert(0, str(ROOT / "host_tools/report/grasp"))
 import emulated_grasp  # noqa: E402
 
 OPTIONS = argparse.Namespace()
-SLID_mm, REACTION_ms, TOLD_ms = 8.0, 60.0, 20.0
+SLID_mm, REACTION_ms, TOLD_ms = 12.0, 60.0, 20.0
 AT_CAP = 1 << 9
 BYTES_OF_ANSWER = 4 + 2 * (8 * 15 + 4)
 

@@ -29,10 +29,14 @@ constexpr double SPIN = 3.0 * M_PI / 16.0;    // torque that spins a Hertz conta
 constexpr double FILTER_s = 1e-3;             // of a slide's speed
 // Mean distance from the middle of a line or an area that is pressed evenly, over that of the ends or corners that MuJoCo has.
 constexpr double EVENLY = 0.5;
+// About the normal: a Hertz contact's stiffness (Mindlin), over that along the patch times the arm's square. The edge of the contact slips
+// with every turn, so that nothing rings; the time constant is assumed.
+constexpr double TWIST = 1.4, TWIST_LOSS_s = 0.05;
 constexpr double LEAST_SHARE = 0.02; // of the force: a point with less is not part of the patch
 constexpr int MOTIONS = 8;           // six of the object, and each face along its normal
 constexpr double PAD_mm = 6.0, TABLE_ROLLS = 10.0, AWAY_m = 10.0, APART_mm = 200.0;
 
+double twist_arm_m(double force_N) { return SPIN * M * RADIUS_mm * std::cbrt(std::max(force_N, 0.05) / AT_N); }
 double pad_half_x_mm() { return PAD_OVERHANG_mm + static_cast<double>(geometry.x_mm[SENSORS - 1]); }
 double pad_half_y_mm() { return PAD_OVERHANG_mm + std::abs(static_cast<double>(geometry.y_mm[0])); }
 
@@ -200,18 +204,26 @@ struct Cell::World {
       mju_mulMatVec(speed, moves, data->qvel, 3, MOTIONS);
       mju_mulMatVec(spin, turns, data->qvel, 3, MOTIONS);
       slide_m_s = {speed[1], speed[2], pad.arm_m * spin[0]};
-      const double shear_N_m = grasp.shear_N_mm / M * std::cbrt(std::max(pad.force_N, 0.05) / AT_N);
-      const double damping = grasp.rubber_N_s_mm / M;
+      const double along_N_m = grasp.shear_N_mm / M * std::cbrt(std::max(pad.force_N, 0.05) / AT_N), along = grasp.rubber_N_s_mm / M;
+      const double edge = std::pow(twist_arm_m(pad.force_N) / pad.arm_m, 2);
+      const std::array<double, 3> shear_N_m = {along_N_m, along_N_m, TWIST * along_N_m};
+      const std::array<double, 3> damping = {along, along, along + edge * TWIST_LOSS_s * along_N_m};
+      const double most_N = pad.friction * pad.force_N;
+      const auto limit = [&](std::array<double, 3> &all_N) {
+        const double share = std::min(1.0, most_N / std::max(std::hypot(all_N[0], all_N[1], all_N[2]), 1e-9));
+        std::for_each(all_N.begin(), all_N.end(), [share](double &one_N) { one_N *= share; });
+      };
       for (std::size_t k = 0; k < 3; k++) {
-        pull_N[k] = shear_N_m * (pad.pulled_m[k] + STEP_s * slide_m_s[k]) + damping * slide_m_s[k];
+        pull_N[k] = shear_N_m[k] * (pad.pulled_m[k] + STEP_s * slide_m_s[k]);
       }
-      const double held = pad.friction * pad.force_N / std::max(std::hypot(pull_N[0], pull_N[1], pull_N[2]), 1e-9);
+      limit(pull_N); // the springs decide where it slides to
       for (std::size_t k = 0; k < 3; k++) {
-        pull_N[k] *= std::min(held, 1.0);
-        const double gives_m = (pull_N[k] - shear_N_m * pad.pulled_m[k]) / (shear_N_m + damping / STEP_s);
-        pad.pulled_m[k] += gives_m;
-        slide_m_s[k] -= gives_m / STEP_s;
+        const double gives_m_s = (pull_N[k] / shear_N_m[k] - pad.pulled_m[k]) / STEP_s;
+        pad.pulled_m[k] += STEP_s * gives_m_s;
+        slide_m_s[k] -= gives_m_s;
+        pull_N[k] += damping[k] * gives_m_s;
       }
+      limit(pull_N);
       const mjtNum force_N[3] = {0.0, -pull_N[0], -pull_N[1]}, torque_N_m[3] = {-pad.arm_m * pull_N[2], 0.0, 0.0};
       mj_applyFT(model.get(), data.get(), force_N, torque_N_m, pad.middle_m.data(), object, data->qfrc_applied);
     }
@@ -249,7 +261,7 @@ struct Cell::World {
     for (const Point &point : pad.points) {
       apart_m += point.force_N / sum_N * std::hypot(point.level_m - level_m, point.up_m - up_m);
     }
-    pad.arm_m = SPIN * M * RADIUS_mm * std::cbrt(pad.force_N / AT_N) + EVENLY * apart_m;
+    pad.arm_m = twist_arm_m(pad.force_N) + EVENLY * apart_m;
   }
 
   void step(double width_mm, const KindOfGrasp::Inputs &inputs) {
