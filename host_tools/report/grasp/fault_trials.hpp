@@ -6,9 +6,7 @@
 
 namespace fingertip::grasp {
 
-// A row each: what was reported, how far the fingers opened, the largest true force, whether the object was
-// crushed, and which rules were broken. Of fingertips whose readings froze before they touched nothing can be
-// reported: `untold`.
+// A row each. `untold`: readings froze before they touched, so nothing can be reported.
 nlohmann::ordered_json fault_rows(std::uint64_t jobs);
 
 } // namespace fingertip::grasp

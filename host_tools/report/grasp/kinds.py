@@ -101,13 +101,8 @@ def percent(part, whole):
 def summary(each):
     held = [one for one in each if not one["dropped"] and not one["never_held"]]
     slid = [one for one in held if one["slides"] and one["shape"] in BY_SHAPE["ball"][0]]
-    need = [
-        slide["peak_N"] / slide["least_N"]
-        for one in each
-        if not one["dropped"]
-        for slide in one["catches"]
-        if slide["least_N"] >= NEED_LEAST_N
-    ]
+    needed = [slide for one in each if not one["dropped"] for slide in one["catches"] if slide["least_N"] >= NEED_LEAST_N]
+    need = [slide["peak_N"] / slide["least_N"] for slide in needed]
     return {
         "grasps": len(each),
         "drops_percent": percent(sum(one["dropped"] or one["never_held"] for one in each), len(each)),

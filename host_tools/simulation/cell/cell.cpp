@@ -209,21 +209,18 @@ struct Cell::World {
       const std::array<double, 3> shear_N_m = {along_N_m, along_N_m, TWIST * along_N_m};
       const std::array<double, 3> damping = {along, along, along + edge * TWIST_LOSS_s * along_N_m};
       const double most_N = pad.friction * pad.force_N;
-      const auto limit = [&](std::array<double, 3> &all_N) {
-        const double share = std::min(1.0, most_N / std::max(std::hypot(all_N[0], all_N[1], all_N[2]), 1e-9));
-        std::for_each(all_N.begin(), all_N.end(), [share](double &one_N) { one_N *= share; });
-      };
+      const auto limit = [&] { mju_scl3(pull_N.data(), pull_N.data(), std::min(1.0, most_N / std::max(mju_norm3(pull_N.data()), 1e-9))); };
       for (std::size_t k = 0; k < 3; k++) {
         pull_N[k] = shear_N_m[k] * (pad.pulled_m[k] + STEP_s * slide_m_s[k]);
       }
-      limit(pull_N); // the springs decide where it slides to
+      limit(); // the springs decide where it slides to
       for (std::size_t k = 0; k < 3; k++) {
         const double gives_m_s = (pull_N[k] / shear_N_m[k] - pad.pulled_m[k]) / STEP_s;
         pad.pulled_m[k] += STEP_s * gives_m_s;
         slide_m_s[k] -= gives_m_s;
         pull_N[k] += damping[k] * gives_m_s;
       }
-      limit(pull_N);
+      limit();
       const mjtNum force_N[3] = {0.0, -pull_N[0], -pull_N[1]}, torque_N_m[3] = {-pad.arm_m * pull_N[2], 0.0, 0.0};
       mj_applyFT(model.get(), data.get(), force_N, torque_N_m, pad.middle_m.data(), object, data->qfrc_applied);
     }
