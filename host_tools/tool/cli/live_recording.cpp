@@ -27,6 +27,10 @@ public:
     }
   }
   void append(const void *bytes, std::size_t length) override {
+    if (!std::exchange(has_begun_, true)) {
+      sink_->append(bytes, length); /* here it throws where nothing can be written */
+      return;
+    }
     queue_.emplace_back(static_cast<const char *>(bytes), length);
     queued_bytes_ += length;
     const bool is_idle = !writing_.valid() || writing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
@@ -63,6 +67,7 @@ private:
   std::unique_ptr<ByteSink> sink_;
   std::vector<std::string> queue_;
   std::size_t queued_bytes_ = 0;
+  bool has_begun_ = false;
   HostTime next_{};
   std::future<void> writing_;
 };
