@@ -476,14 +476,16 @@ static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
 #define NARROWNESS_MAX_Q12 (1 << 11) /* a dip is wider than its contact */
 
 /* Takes FIT_DIP_END from the nearer end of an axis. */
-static NOINLINE void take_end(int32_t *dip, int32_t nodes, int32_t centre) {
-  int32_t inside_q15 = (centre >> 11) + nodes / 2 * (1 << 15);
-  int32_t last_q15 = (nodes - 1) * (1 << 15);
-  if (inside_q15 > last_q15 >> 1) {
-    inside_q15 = last_q15 - inside_q15;
-    dip += nodes - 1;
+static NOINLINE void take_end(int32_t *dip, int32_t last, int32_t centre) {
+  int32_t inside_q15 = (centre >> 11) + ((last + 1) >> 1 << 15), other_q15 = (last << 15) - inside_q15;
+  if (inside_q15 > other_q15) {
+    inside_q15 = other_q15;
+    dip += last;
   }
-  *dip -= (*dip >> 15) * fixed_clamp(DIP_END_Q15 - ((inside_q15 * 3) >> 2), 0, nodes > 2 ? DIP_END_Q15 : 0);
+  int32_t share_q15 = DIP_END_Q15 - ((inside_q15 * 3) >> 2);
+  if (share_q15 > 0) {
+    *dip -= (*dip >> 15) * (share_q15 < DIP_END_Q15 ? share_q15 : DIP_END_Q15);
+  }
 }
 
 /* The dip at the sensors in use. */
@@ -500,8 +502,12 @@ static NOINLINE void set_dip(const struct readings *readings, const struct fit_s
   struct dip dip;
   int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, 1 << 28, system->rise_q22, DEPTH_MAX_Q28, &dip);
   if (at->height > THIN_HEIGHT_Q26) {
-    take_end(dip.x, COLUMNS, at->x);
-    take_end(dip.y, ROWS, at->y);
+    if (COLUMNS > 2) {
+      take_end(dip.x, COLUMNS - 1, at->x);
+    }
+    if (ROWS > 2) {
+      take_end(dip.y, ROWS - 1, at->y);
+    }
   }
   for (int k = 0; k < NODES; k++) {
     int32_t along = fixed_mul_q30(depth_q28 * 4, dip.x[k / ROWS]);
