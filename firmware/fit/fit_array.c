@@ -50,7 +50,6 @@ static void find_grid(struct fit_array *made, const float *x_mm, const float *y_
     grid->sensor[column * rows + row] = k;
     seen |= sensor_bit((unsigned)(column * rows + row));
   }
-  /* NOLINTNEXTLINE(clang-analyzer-core.UndefinedBinaryOperatorResult): at least one sensor */
   if (seen != first_sensors(made->sensor_count)) {
     return;
   }

@@ -51,7 +51,7 @@ struct parameters {
 /* What cast rubber takes from the Gaussian e: share exp(-(X^2 + Y^2) / (2 sd^2)), of the same amplitude. */
 struct dip {
   float share, log2_scale, narrowness; /* log2(e) / (2 sd^2), 1 / sd^2 */
-  const struct fit_array *array;
+  const struct fit_array *ends;        /* of the pad, where the dip is less; NULL: nowhere */
 };
 
 /* One more row weight (sigma - prior) of the least squares, pitches; weight 0: none. */
@@ -183,7 +183,7 @@ static float model_row(const struct dip *dip, const struct parameters *at, float
   float r2 = x * x + y * y, sigma2 = at->sigma * at->sigma;
   float e = fit_exp2_negative(r2 * (0.5f * LOG2_E / sigma2));
   float d = dip->share > 0.0f ? dip->share * fit_exp2_negative(r2 * dip->log2_scale) : 0.0f;
-  d *= fit_dip_there(dip->array, at->sigma, at->x, at->y, place_x, place_y);
+  d = dip->ends ? d * fit_dip_there(dip->ends, at->x, at->y, place_x, place_y) : d;
   float slope = e - sigma2 * dip->narrowness * d;
   row[0] = e - d;
   row[1] = slope * x;
@@ -451,7 +451,7 @@ static void set_known(struct problem *problem) {
     problem->prior.sigma = settings->prior_sigma_mm / pitch_mm;
     problem->prior.weight = FIT_PRIOR_WEIGHT * pitch_mm / settings->prior_width_mm;
   }
-  problem->dip = (struct dip){0.0f, 0.0f, 0.0f, problem->array};
+  problem->dip = (struct dip){0.0f, 0.0f, 0.0f, fit_steps_want_dip(problem->array, settings) ? problem->array : NULL};
   if (fit_has_dip(settings)) {
     float sd = clamp(settings->dip_sd_mm / pitch_mm, FIT_DIP_SD_MIN, FIT_DIP_SD_MAX);
     problem->dip.share = settings->dip_share;

@@ -470,8 +470,8 @@ static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
   return (power << 22) + fit_grid_rise(at->height, offset_x, offset_y);
 }
 
-#define DEPTH_MAX_Q28 (1 << 26)   /* of the strongest node, which is from a quarter to one */
-#define THIN_HEIGHT_Q26 160035392 /* sigma FIT_SHAPE_LEAST */
+#define DEPTH_MAX_Q28 (1 << 26) /* of the strongest node, which is from a quarter to one */
+#define SHAPE_LEAST_Q16 ((uint32_t)(FIT_SHAPE_LEAST * 65536.0f))
 #define DIP_END_Q15 ((int32_t)(FIT_DIP_END * 32768.0f))
 #define NARROWNESS_MAX_Q12 (1 << 11) /* a dip is wider than its contact */
 
@@ -501,7 +501,8 @@ static NOINLINE void set_dip(const struct readings *readings, const struct fit_s
   c->narrowness_q12 = narrowness < NARROWNESS_MAX_Q12 ? narrowness : NARROWNESS_MAX_Q12;
   struct dip dip;
   int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, 1 << 28, system->rise_q22, DEPTH_MAX_Q28, &dip);
-  if (at->height > THIN_HEIGHT_Q26) {
+  const uint32_t known_q16 = (uint32_t)fit_scaled_to_fixed(readings->prior_sigma, 16); /* 0: it is not */
+  if (known_q16 - 1u < SHAPE_LEAST_Q16 - 1u) {
     if (COLUMNS > 2) {
       take_end(dip.x, COLUMNS - 1, at->x);
     }

@@ -76,8 +76,8 @@ static inline float fit_location_sd_limit_mm(const struct fit_settings *settings
  * dip. Chosen on the recording that chooses of host_tools/report/real. */
 #define FIT_DIP_ERROR 0.2f
 #define FIT_DIP_ERROR_Q16 ((int32_t)(FIT_DIP_ERROR * 65536.0f))
-/* Below a sigma of FIT_SHAPE_LEAST pitches, a sensor of an outer row has the dip of a contact there less this share, which falls by
- * 3/4 per pitch inwards. Chosen on recordings that only show, of other pitches: 0.2 to 0.8. */
+/* Where the derivatives have the dip, a sensor of an outer row has that of a contact there less this share, which falls by 3/4 per pitch
+ * inwards. On recordings that only show: 0.2 to 0.8. */
 #define FIT_DIP_END 0.5f
 #define FIT_DIP_SD_MIN 0.5f
 #define FIT_DIP_SD_MAX 5.0f
@@ -106,15 +106,14 @@ static inline bool fit_steps_want_dip(const struct fit_array *array, const struc
   return fit_has_dip(settings) && fit_has_prior(settings) && settings->prior_sigma_mm < FIT_SHAPE_LEAST * array->pitch_mm;
 }
 
-/* The share of a dip that a sensor at (x, y) has of a contact of this sigma, pitches. low, high: the box of the location. */
+/* The share of a dip that a sensor at (x, y) has of a contact, pitches (FIT_DIP_END). low, high: the box of the location. */
 static inline float fit_dip_along(float low, float high, float at, float place) {
   float inside = place < low + 2.0f ? at - low : high - at;
   bool is_end = fminf(place - low, high - place) < 2.0f && high - low > 4.5f;
   return is_end ? 1.0f - fminf(fmaxf(FIT_DIP_END - 0.75f * (inside - 1.5f), 0.0f), FIT_DIP_END) : 1.0f;
 }
-static inline float fit_dip_there(const struct fit_array *array, float sigma, float at_x, float at_y, float x, float y) {
-  bool thin = sigma < FIT_SHAPE_LEAST;
-  return thin ? fit_dip_along(array->x_min, array->x_max, at_x, x) * fit_dip_along(array->y_min, array->y_max, at_y, y) : 1.0f;
+static inline float fit_dip_there(const struct fit_array *array, float at_x, float at_y, float x, float y) {
+  return fit_dip_along(array->x_min, array->x_max, at_x, x) * fit_dip_along(array->y_min, array->y_max, at_y, y);
 }
 
 /* Whether the sensors are the rectangle of the build. */

@@ -89,7 +89,7 @@ def recordings(build):
 
 @job("tools", ("record1_lost", "<=", 0), ("record8_lost", "<=", 0), ("record16_lost", "<=", 0), ("stall_2s_lost", "<=", 0))
 def many(build):
-    """Packets that `record --all` counts as lost, of one, eight and sixteen fingertips at the highest rate; and those of a pipe that nobody reads
+    """Packets that `record --all` counts as lost, of one, eight and sixteen fingertips at the highest rate; and those of a pipe that no one reads
     for two seconds in the middle of it."""
     found = {"stall_2s_lost": 0}
     for count, name, stalls_at in itertools.product((1, 8, 16), ("many.mcap", "many.csv"), (0, 100_000)):

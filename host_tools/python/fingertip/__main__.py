@@ -7,16 +7,20 @@
 
 import importlib
 import sys
+from collections.abc import Callable
 from typing import Any
 
 COMMANDS = ("plot", "scenario", "evaluate", "fit", "validate", "ros2", "bridge", "recorder")
 
 
-def main() -> Any:
+def command() -> Callable[[], Any]:
+    """What the first word names, which is taken out of sys.argv."""
     if len(sys.argv) < 2 or sys.argv[1] not in COMMANDS:
-        return __doc__
-    return importlib.import_module(f"fingertip.{sys.argv.pop(1)}").command()
+        sys.exit(__doc__)
+    named: Callable[[], Any] = importlib.import_module(f"fingertip.{sys.argv[1]}").command
+    del sys.argv[1]
+    return named
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command()())

@@ -368,14 +368,15 @@ bool goes_astray(const Array &array, const Solution &s) {
   const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
   const auto [bottom, top] = std::minmax_element(array.y_mm.begin(), array.y_mm.end());
   const std::vector<double> ones(array.sensors(), 1.0);
+  const bool ends = fit_steps_want_dip(&fit.of, &fit.settings);
   for (double x = *left; x <= *right; x += array.pitch_mm / STEPS) {
     for (double y = *bottom; y <= *top; y += array.pitch_mm / STEPS) {
       Placement press;
       press.usable = (1u << array.sensors()) - 1u;
       for (std::size_t k = 0; k < array.sensors(); k++) {
         const double per = std::pow(std::hypot(array.x_mm[k] - x, array.y_mm[k] - y) / s.width_mm, 2) / 2.0;
-        const double there = fit_dip_there(&fit.of, float(s.sigma_mm / array.pitch_mm), float(x / array.pitch_mm),
-                                           float(y / array.pitch_mm), fit.of.x[k], fit.of.y[k]);
+        const double there =
+            ends ? fit_dip_there(&fit.of, float(x / array.pitch_mm), float(y / array.pitch_mm), fit.of.x[k], fit.of.y[k]) : 1.0F;
         press.reading_Pa.push_back(s.peak_Pa * ((1.0 - s.mixing) * std::exp(-per) + s.mixing * std::exp(-per / (NARROW * NARROW)) -
                                                 there * s.dip * std::exp(-per / (s.dip_widths * s.dip_widths))));
       }

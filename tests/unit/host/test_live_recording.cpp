@@ -8,7 +8,7 @@
 
 using namespace fingertip;
 
-/* A pipe of one page stands for the disk: nobody reads it until two seconds are recorded. */
+/* A pipe of one page is the disk: no one reads it until two seconds are recorded. */
 static void record_while_it_stalls(std::size_t devices, const std::string &name) {
   constexpr std::uint32_t FRAMES = 2 * 1308;
   test::TemporaryFolder folder;
