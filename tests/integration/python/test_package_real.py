@@ -69,9 +69,9 @@ class Streaming(DeviceTest):
                 self.assertEqual(numbers, list(range(numbers[0], numbers[0] + 60)))
                 self.assertEqual(len(await tip.read_block(10)), 10)
                 with await tip.record(self.csv) as writer:
-                    self.assertEqual(len(await anext(tip.blocks(20))), 20)
+                    while writer.frames < 20:  # the first frames may have come before it
+                        self.assertEqual(len(await anext(tip.blocks(20))), 20)
                     self.assertGreater((await tip.latest()).frame, numbers[-1])
-                self.assertGreaterEqual(writer.frames, 20)
 
         async def gone():
             async with fingertip.AsyncFingertip(self.port, timeout_s=PATIENCE_s) as tip:
