@@ -4,8 +4,8 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
-#include <mutex>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -541,8 +541,8 @@ std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place
   const int nodes_x = block_nodes(block.half_x_mm, step_mm);
   const int nodes_y = block_nodes(block.half_y_mm, step_mm);
   std::vector<BlockAnswer> answers(places.size());
-  std::mutex telling;
-  std::size_t done = 0;
+  const auto caller = std::this_thread::get_id();
+  std::atomic<std::size_t> done{0};
   const auto solve = [&](std::size_t n) {
     const Place &place = places[n];
     std::array<Matrix, 3> moved;
@@ -565,10 +565,9 @@ std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place
         answer.along_y.push_back(static_cast<float>(-1e6 * moved[1](i, j)));
       }
     }
-    const std::lock_guard<std::mutex> lock(telling);
-    done++;
-    if (on_progress) {
-      on_progress(static_cast<double>(done) / static_cast<double>(places.size()));
+    const std::size_t finished = ++done;
+    if (on_progress && std::this_thread::get_id() == caller) {
+      on_progress(static_cast<double>(finished) / static_cast<double>(places.size()));
     }
   };
   in_parallel(places.size(), solve, std::max(1u, std::thread::hardware_concurrency()));
