@@ -366,8 +366,8 @@ class Looks(PageTest):
     """Against pictures that somebody has looked at, of the same moment of a recording."""
 
     LIMIT = 11  # of what one place in a hundred exceeds: other fonts 4 (with serifs) to 10.5 (of one width), no traces 24 in their part, no colours 45, no pad 57
-    SIZES = {"light": (1120, 760), "dark": (1120, 760), "phone": (390, 780)}
-    MANUALS_SIZE = (1120, 820)
+    SIZES = {"light": (1280, 800), "dark": (1280, 800), "phone": (390, 780)}
+    MANUALS_SIZE = (1280, 800)
 
     def recorded(self, name, scenario, *options):
         recording = self.folder / name
@@ -378,7 +378,7 @@ class Looks(PageTest):
     def paused(self, recording=None, steps=MOMENT_STEPS):
         """A page that shows the same moment of the same recording; without one: of a lime that slips, simulated."""
         recording = recording or self.recorded("lime.csv", self.scenario("slip", "--indenter", "lime", "--gain", 10, "--seconds", 12))
-        page = self.open(before=TEN_TIMES, width=1120, height=760)
+        page = self.open(before=TEN_TIMES)
         page.give("input[type=file]", recording)
         page.until("fingertip.fingertips[0]?.state === 'closed'")
         root = page.call("DOM.getDocument")["root"]["nodeId"]
@@ -445,8 +445,8 @@ class Looks(PageTest):
     def test_a_pause_follows_the_window(self):
         """The flags, which are drawn with the page's own pen, as the plots."""
         page = self.paused()
-        for width in (700, 1120):
-            page.size(width, 760)
+        for width in (700, 1280):
+            page.size(width, 800)
             flags_px = "document.querySelector('canvas.flags').getBoundingClientRect().width"
             page.until(f"document.querySelector('.traces').clientWidth === {flags_px}")
 
@@ -514,9 +514,9 @@ class Everyone(PageTest):
 
     NAMED = set("button link textbox checkbox radio combobox listbox slider spinbutton tab menuitem searchbox switch dialog".split())
 
-    def everything(self):
+    def everything(self, before=""):
         """A page with a simulated fingertip on it."""
-        page = self.open()
+        page = self.open(before=before)
         page.click("button", "Simulate")
         driven.connected(page, 1)
         return page
@@ -542,14 +542,13 @@ class Everyone(PageTest):
                 page.click("button", close)
                 page.until("!document.querySelector('dialog')")
 
-    def test_from_a_phone_to_a_wall(self):
-        page = self.everything()
-        for width, height in ((360, 740), (800, 600), (1280, 800), (3840, 2160)):
-            page.size(width, height)
-            page.shown()
-            self.assertLessEqual(page.run("document.documentElement.scrollWidth"), width)
-            for role, name in (("button", "Connect"), ("button", "Tare"), ("button", "Record")):
-                self.assertTrue(page.has(role, name), (width, name))
+    WRITTEN = """globalThis.written = []; const fillText = CanvasRenderingContext2D.prototype.fillText;
+      CanvasRenderingContext2D.prototype.fillText = function (text, x, y, most) {
+        written.push({where: this.canvas, text, x, y, width: this.measureText(text).width});
+        return fillText.call(this, text, x, y, ...(most === undefined ? [] : [most])); };
+      const clearRect = CanvasRenderingContext2D.prototype.clearRect;
+      CanvasRenderingContext2D.prototype.clearRect = function (...all) {
+        written = written.filter(each => each.where !== this.canvas); return clearRect.apply(this, all); };"""
 
     OVERLAP = """(() => {
       const box = each => each.getBoundingClientRect(), found = [], low = document.querySelector('.timeline');
@@ -561,15 +560,24 @@ class Everyone(PageTest):
         if (box(part).bottom > box(low).top + 1) found.push(`${part.textContent || part.className} under the time bar`);
         if (i && box(part).top < box(parts[i - 1]).bottom - 1) found.push(`${part.textContent || part.className} over what is before it`);
       }
+      const on = canvas => written.filter(each => each.where === canvas), labels = on(document.querySelector('.pad-labels'));
+      labels.forEach((one, i) => labels.slice(0, i).forEach(other => {
+        if (Math.abs(one.x - other.x) < (one.width + other.width) / 2 && Math.abs(one.y - other.y) < 9) found.push(`${one.text} on ${other.text}`);
+      }));
+      const reach = (axis, whole) => (Math.max(...labels.map(each => each[axis])) - Math.min(...labels.map(each => each[axis]))) / whole;
+      const pad = box(document.querySelector('.pad')), share = reach('x', pad.width) * reach('y', pad.height);
+      if (!(share > 0.25)) found.push(`the pad has ${share} of its card`);
+      for (const part of document.querySelectorAll('.trace'))
+        if (new Set(on(part.querySelector('canvas')).map(each => each.text).filter(text => !/ s$/.test(text))).size < 3) found.push(`${part.textContent}: no three ticks`);
       return parts.length < 4 ? ['no traces'] : found;
     })()"""
 
     def test_nothing_covers_another(self):
-        """Traces, their times and the flags stand free, whatever was scrolled; where there is room, on the first screen, the time bar too."""
-        page = self.everything()
+        """Traces, their ticks and the flags stand free, whatever was scrolled, and the pad's numbers; where there is room, on the first screen, the time bar too."""
+        page = self.everything(self.WRITTEN)
         page.click("button", "Press")
         page.until("fingertip.fingertips[0].contact.force_N > 2")
-        for width, height in ((1280, 800), (1920, 1080), (390, 844)):
+        for width, height in ((1280, 800), (1920, 1080), (390, 844), (360, 740), (800, 600), (3840, 2160)):
             page.size(width, height)
             for part in (".top", ".over-time"):
                 page.run(f"document.querySelector('{part}').scrollIntoView()")
@@ -577,35 +585,30 @@ class Everyone(PageTest):
                 for _ in range(3):
                     page.shown()
                 self.assertEqual(page.run(self.OVERLAP), [], (width, height))
-            if width > 390:
+            self.assertLessEqual(page.run("document.documentElement.scrollWidth"), width)
+            if width > 800:
                 page.run("scrollTo(0, 0)")
                 self.assertLessEqual(page.run("document.querySelector('.timeline').getBoundingClientRect().bottom"), height)
                 self.assertGreater(page.run("document.querySelector('.pad').getBoundingClientRect().height"), 200)
 
-    WRITTEN = """globalThis.written = []; const fillText = CanvasRenderingContext2D.prototype.fillText;
-      CanvasRenderingContext2D.prototype.fillText = function (text, x, y, most) {
-        if (this.canvas.className) written.push({where: this.canvas.className, text, x, y, end: x + this.measureText(text).width});
-        return fillText.call(this, text, x, y, ...(most === undefined ? [] : [most])); };"""
-
     def test_the_pad_has_axes_in_mm(self):
-        page = self.open(before=self.WRITTEN)
-        page.click("button", "Simulate")
-        driven.connected(page, 1)
+        page = self.everything(self.WRITTEN)
         page.click("button", "From above")
-        page.shown()
         page.run("written.length = 0")
-        page.until("written.some(each => /y .*mm/.test(each.text))")
-        page.shown()
-        said = [(each["text"], (each["x"], each["y"])) for each in page.run("written.filter(each => each.where === 'pad-labels')")]
-        last = len(page.run("Array.from(fingertip.fingertips[0].info.x_mm)")) - 1
+        page.until("written.some(each => /y mm/.test(each.text))")
+        said = [
+            (text, at)
+            for text, *at in page.run(
+                "written.filter(each => each.where.className === 'pad-labels').map(each => [each.text, each.x, each.y])"
+            )
+        ]
         at = dict(said)
         for axis, name, most_mm in ((0, "x", 10), (1, "y", 20)):
             sensors_mm = page.run(f"Array.from(fingertip.fingertips[0].info.{name}_mm)")
-            px_per_mm = (at[str(last)][axis] - at["6"][axis]) / (sensors_mm[last] - sensors_mm[6])
-            end = at[f"{name} {most_mm} mm"]
-            opposite = [place for text, place in said if text == f"−{most_mm}" and abs(place[1 - axis] - end[1 - axis]) < 2]
-            self.assertTrue(opposite, said)
-            self.assertAlmostEqual((end[axis] - opposite[-1][axis]) / px_per_mm, 2 * most_mm, delta=0.5, msg=name)
+            px_per_mm = (at["14"][axis] - at["6"][axis]) / (sensors_mm[14] - sensors_mm[6])
+            ends = [place for text, place in said if text == str(most_mm) and abs(place[0] - at[f"{name} mm"][0]) < 2]
+            opposite = [place for text, place in said if text == f"−{most_mm}" and abs(place[1 - axis] - ends[0][1 - axis]) < 2]
+            self.assertAlmostEqual((ends[0][axis] - opposite[0][axis]) / px_per_mm, 2 * most_mm, delta=0.5, msg=name)
 
     def test_a_simulated_processor_has_no_load(self):
         page = self.everything()

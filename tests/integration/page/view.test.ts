@@ -7,8 +7,8 @@ import test from 'node:test';
 import { Flag, PacketType, type Contact } from '../../../host_tools/web/src/line/line_facts';
 import { History } from '../../../host_tools/web/src/model/history';
 import { Buckets, Trust, intervalOf, roundAbove } from '../../../host_tools/web/src/view/buckets';
-import { cameraOf, picked, seen, type Box } from '../../../host_tools/web/src/view/camera';
-import { chartOf, clock, spansOf } from '../../../host_tools/web/src/view/curves';
+import { cameraOf, picked, seen, type Point } from '../../../host_tools/web/src/view/camera';
+import { chartOf, clock, spansOf, ticksOf } from '../../../host_tools/web/src/view/curves';
 import { contactAt, trailAt } from '../../../host_tools/web/src/view/recorded_contact';
 import { sceneOf } from '../../../host_tools/web/src/view/pad_scene';
 import { HEAT_STOPS, contrast, paletteOf, parsed } from '../../../host_tools/web/src/view/palette';
@@ -146,6 +146,7 @@ test('solid where it can be trusted, dashed where not, and the two meet', () => 
 
 test('limits of axes and intervals are round', () => {
   assert.deepEqual([0.11, 1, 5.01, NaN].map(roundAbove), [0.2, 1, 10, 1]);
+  assert.deepEqual([ticksOf(-24, 24, 2.3), ticksOf(0, 5, 1), ticksOf(-0.5, 0.5, 4)].map(String), ['-20,0,20', '0,2,4', '-0.5,0,0.5']);
   for (const [span_s, pixels] of [
     [20, 900],
     [180, 333],
@@ -160,13 +161,14 @@ test('times go on beyond a minute', () => {
   assert.deepEqual([0, 2.5, 59.96, 60, 62.5, 605.04].map(clock), ['0 s', '2.5 s', '1:00', '1:00', '1:02.5', '10:05']);
 });
 
-const BOX: Box = { x_mm: 15, y_mm: 24, low_mm: -6, high_mm: 16 };
+const PART = [0.9, 0.8] as const;
+const BOX = [-15, 15].flatMap((x) => [-24, 24].flatMap((y) => [-6, 16].map((z): Point => [x, y, z])));
 
 test('what is picked is what is seen there, from every side', () => {
   for (const turn_deg of [-170, -32, 0, 45, 120]) {
     for (const tilt_deg of [12, 40, 75, 90]) {
       for (const aspect of [0.4, 1, 2.6]) {
-        const camera = cameraOf({ turn_deg, tilt_deg }, aspect, BOX);
+        const camera = cameraOf({ turn_deg, tilt_deg }, aspect, BOX, PART);
         for (const [x_mm, y_mm, z_mm] of [
           [0, 0, 0],
           [9, -18, 0],
@@ -187,27 +189,22 @@ test('the whole pad is in the picture, and fills it', () => {
   for (const turn_deg of [-90, -32, 0, 200]) {
     for (const tilt_deg of [12, 40, 90]) {
       for (const aspect of [0.4, 1, 2.6]) {
-        const camera = cameraOf({ turn_deg, tilt_deg }, aspect, BOX);
-        let reach = 0;
-        for (const x of [-1, 1]) {
-          for (const y of [-1, 1]) {
-            for (const z of [BOX.low_mm, BOX.high_mm]) {
-              const { right, up } = seen(camera, [x * BOX.x_mm, y * BOX.y_mm, z]);
-              reach = Math.max(reach, Math.abs(right), Math.abs(up));
-            }
-          }
-        }
-        assert.ok(reach < 1 && reach > 0.85, `${turn_deg} ${tilt_deg} ${aspect}: ${reach}`);
+        const camera = cameraOf({ turn_deg, tilt_deg }, aspect, BOX, PART);
+        const sides = (['right', 'up'] as const).flatMap((axis, i) =>
+          [1, -1].map((sign) => Math.max(...BOX.map((point) => (sign * seen(camera, point)[axis]) / PART[i]))),
+        );
+        const full = sides.filter((side) => side > 1 - 1e-9).length;
+        assert.ok(full >= 2 && Math.max(...sides) < 1 + 1e-9, `${turn_deg} ${tilt_deg} ${aspect}: ${sides}`);
       }
     }
   }
 });
 
 test('from above x is to the right and y up; the sky is no place on the pad', () => {
-  const above = cameraOf({ turn_deg: 0, tilt_deg: 90 }, 1, BOX);
+  const above = cameraOf({ turn_deg: 0, tilt_deg: 90 }, 1, BOX, PART);
   assert.ok(seen(above, [9, 0, 0]).right > 0.1 && Math.abs(seen(above, [9, 0, 0]).up) < 1e-5);
   assert.ok(seen(above, [0, 9, 0]).up > 0.1 && Math.abs(seen(above, [0, 9, 0]).right) < 1e-5);
-  assert.equal(picked(cameraOf({ turn_deg: 0, tilt_deg: 2 }, 1, BOX), 0, 0.99), null);
+  assert.equal(picked(cameraOf({ turn_deg: 0, tilt_deg: 2 }, 1, BOX, PART), 0, 0.99), null);
 });
 
 const tokens = readFileSync(join(process.env['FINGERTIP_SOURCE'] ?? '', 'host_tools/web/src/styles/tokens.css'), 'utf8');

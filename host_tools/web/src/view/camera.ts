@@ -9,17 +9,8 @@ export interface Look {
   tilt_deg: number;
 }
 
-/** What must stay in the picture. */
-export interface Box {
-  readonly x_mm: number; // half of its size
-  readonly y_mm: number;
-  readonly low_mm: number;
-  readonly high_mm: number;
-}
-
 /** Half the angle from the lower to the upper edge: narrow, so that lengths compare. */
 const HALF_VIEW_rad = 0.21;
-const RIM = 0.94;
 
 const radians = (degrees: number) => (degrees * Math.PI) / 180;
 
@@ -31,27 +22,27 @@ export interface Camera {
   readonly aspect: number;
 }
 
-/** aspect: width over height. The nearest distance from which the box is seen whole. */
-export function cameraOf(look: Look, aspect: number, box: Box): Camera {
+/** aspect: width over height. The nearest place from which all of these points are seen, in the middle part of the width and of the height. */
+export function cameraOf(look: Look, aspect: number, points: readonly Point[], part: readonly [number, number]): Camera {
   const turn = radians(look.turn_deg);
   const tilt = radians(look.tilt_deg);
   const right: Point = [Math.cos(turn), Math.sin(turn), 0];
   const up: Point = [-Math.sin(turn) * Math.sin(tilt), Math.cos(turn) * Math.sin(tilt), Math.cos(tilt)];
   const back: Point = [Math.sin(turn) * Math.cos(tilt), -Math.cos(turn) * Math.cos(tilt), Math.sin(tilt)];
-  const high = Math.tan(HALF_VIEW_rad) * RIM;
-  const wide = high * aspect;
-  const middle_mm = (box.low_mm + box.high_mm) / 2;
-  let distance_mm = 0;
-  for (const x of [-box.x_mm, box.x_mm]) {
-    for (const y of [-box.y_mm, box.y_mm]) {
-      for (const z of [box.low_mm - middle_mm, box.high_mm - middle_mm]) {
-        const corner: Point = [x, y, z];
-        const ahead = dot(corner, back);
-        distance_mm = Math.max(distance_mm, ahead + Math.abs(dot(corner, right)) / wide, ahead + Math.abs(dot(corner, up)) / high);
-      }
-    }
-  }
-  const eye: Point = [back[0] * distance_mm, back[1] * distance_mm, back[2] * distance_mm + middle_mm];
+  const high = Math.tan(HALF_VIEW_rad);
+  /** Between two opposite edges of the picture: how far aside, and how far back at least. */
+  const between = (along: Point, slope: number): [number, number] => {
+    const [most, least] = [1, -1].map((sign) => Math.max(...points.map((each) => sign * dot(each, along) + slope * dot(each, back))));
+    return [(most - least) / 2, (most + least) / (2 * slope)];
+  };
+  const [x, back_x] = between(right, high * aspect * part[0]);
+  const [y, back_y] = between(up, high * part[1]);
+  const z = Math.max(back_x, back_y);
+  const eye: Point = [
+    x * right[0] + y * up[0] + z * back[0],
+    x * right[1] + y * up[1] + z * back[1],
+    x * right[2] + y * up[2] + z * back[2],
+  ];
   return { eye, right, up, back, aspect };
 }
 

@@ -1,6 +1,6 @@
 /** The points of a trace out of its intervals, for uPlot: lists of the same length, null where a line
  * is broken. */
-import { Trust, type Buckets, type ColumnName } from './buckets';
+import { Trust, roundAbove, type Buckets, type ColumnName } from './buckets';
 
 /** good: a solid line; doubtful: a dashed one, which meets it; sdLow, sdHigh: the band. */
 export interface Curves {
@@ -119,4 +119,14 @@ export function clock(t_s: number): string {
   const seconds = String(Math.floor(rest / 10)).padStart(minutes > 0 ? 2 : 1, '0');
   const text = rest % 10 ? `${seconds}.${rest % 10}` : seconds;
   return minutes > 0 ? `${minutes}:${text}` : `${text} s`;
+}
+
+/** Round values from low to high: of most steps, but three values where the range has zero in its middle or at its end. */
+export function ticksOf(low: number, high: number, most: number): number[] {
+  let step = roundAbove((high - low) / Math.max(most, 2));
+  while ((high - low) / step < 2) {
+    step = roundAbove(step / 2.5);
+  }
+  const first = Math.ceil(low / step - 1e-9);
+  return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, i) => (first + i) * step);
 }

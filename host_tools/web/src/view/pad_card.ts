@@ -37,7 +37,9 @@ export class PadCard {
       class: 'above small',
       'aria-pressed': 'false',
     });
-    this.frame.append(this.empty, this.alarm);
+    // At the roots of their pressures: the columns are those of .scale.
+    const scale = ['1', '5', '20', '50', '100 kPa'].map((text) => element('span', {}, text));
+    this.frame.append(this.empty, this.alarm, element('div', { class: 'scale', 'aria-hidden': 'true' }, ...scale));
     this.element = element('figure', { class: 'pad-card' }, element('figcaption', {}, this.nameButton, this.above), this.frame);
     this.element.dataset['finger'] = String(shown.finger);
   }

@@ -1,22 +1,24 @@
 /** The picture of one fingertip's pad: what draws it, how it is turned, and the hand that presses on
  * a simulated one. Nothing happens here for a frame of data: it draws what is there when asked. */
-import { cameraOf, picked, seen, type Box, type Camera, type Look } from './camera';
+import { cameraOf, picked, seen, type Camera, type Look, type Point } from './camera';
 import { PadPicture } from './pad_picture';
-import { HEIGHT_mm, THICKNESS_mm, padSize, type Scene } from './pad_scene';
-import { cssOf, heatOf, heatPart, mix, type Palette } from './palette';
+import { HEIGHT_mm, RIM_mm, THICKNESS_mm, padSize, type Scene } from './pad_scene';
+import { cssOf, heatPart, mix, type Palette } from './palette';
 import { element } from './elements';
 import type { ShownLayout } from './shown';
 
-const FROM_ABOVE: Look = { turn_deg: 0, tilt_deg: 90 };
-const ASLANT: Look = { turn_deg: -32, tilt_deg: 40 };
-/** In a frame that is much wider than high. */
-const ASLANT_WIDE: Look = { turn_deg: -62, tilt_deg: 42 };
-const WIDE = 1.5;
+const ABOVE_deg = 90;
+const ASLANT_deg = -10;
+/** Frames that are wider or higher than this: in the first the pad lies across, in the other it is seen more from above. */
+const WIDE = 1.3;
 const TURN_STEP_deg = 5;
-/** The axes along two edges of the rubber; the numbers are this far outside it. */
+/** The axes along two edges of the rubber; the middles of the numbers are this far outside it. */
 const TICK_STEP_mm = 10;
-const TICK_mm = 1.5;
-const NUMBER_mm = 4;
+const TICK_px = 7;
+const NUMBER_px = 19;
+const NAME_px = 12;
+/** Around the rubber, for the numbers. */
+const MARGIN_px = 38;
 /** Labels are read, not watched. */
 const LABEL_INTERVAL_ms = 125;
 /** A pressure that a reader should notice. */
@@ -36,12 +38,13 @@ export class PadView {
   private readonly canvas = element('canvas', { class: 'pad-picture', 'aria-hidden': 'true' });
   private readonly labels = element('canvas', { class: 'pad-labels', 'aria-hidden': 'true' });
   private readonly picture = new PadPicture(this.canvas);
-  private look: Look = { ...ASLANT };
+  private look: Look = { turn_deg: ASLANT_deg, tilt_deg: 50 };
   private camera: Camera | null = null;
   /** A user has turned it. */
   private turned = false;
   private readonly size: { x_mm: number; y_mm: number };
-  private readonly box: Box;
+  /** What must stay in the picture: rubber and bars. */
+  private readonly points: readonly Point[];
   private scene: Scene | null = null;
   private fitDue = false;
   private changed = true;
@@ -55,12 +58,9 @@ export class PadView {
 
   constructor(layout: ShownLayout, label: string) {
     this.size = padSize(layout);
-    this.box = {
-      x_mm: this.size.x_mm + NUMBER_mm,
-      y_mm: this.size.y_mm + NUMBER_mm,
-      low_mm: -THICKNESS_mm,
-      high_mm: HEIGHT_mm * 0.6,
-    };
+    const corners = (out_mm: number, z_mm: number) =>
+      [-1, 1].flatMap((x) => [-1, 1].map((y): Point => [x * (this.size.x_mm + out_mm), y * (this.size.y_mm + out_mm), z_mm]));
+    this.points = [...corners(0, -THICKNESS_mm), ...corners(0, 0), ...corners(-RIM_mm, HEIGHT_mm * 0.6)];
     const attributes = {
       class: 'pad',
       tabindex: 0,
@@ -74,16 +74,18 @@ export class PadView {
   }
 
   get fromAbove(): boolean {
-    return this.look.tilt_deg === 90 && this.look.turn_deg === 0;
+    return this.look.tilt_deg === ABOVE_deg;
   }
 
   setFromAbove(above: boolean): void {
-    this.turnTo(above ? FROM_ABOVE : this.aslant);
+    this.turnTo(this.lookOf(above));
   }
 
-  private get aslant(): Look {
+  private lookOf(above: boolean): Look {
     const { clientWidth, clientHeight } = this.element;
-    return clientWidth > WIDE * clientHeight ? ASLANT_WIDE : ASLANT;
+    const across = clientWidth > WIDE * clientHeight && this.size.y_mm > this.size.x_mm;
+    const turn_deg = above ? 0 : ASLANT_deg;
+    return { turn_deg: across ? -90 - turn_deg : turn_deg, tilt_deg: above ? ABOVE_deg : clientHeight > WIDE * clientWidth ? 60 : 50 };
   }
 
   show(scene: Scene): void {
@@ -104,7 +106,8 @@ export class PadView {
     if (this.fitDue) {
       this.resize();
     }
-    this.camera ??= cameraOf(this.look, this.canvas.width / this.canvas.height, this.box);
+    const { clientWidth: width, clientHeight: height } = this.element;
+    this.camera ??= cameraOf(this.look, width / height, this.points, [1 - (2 * MARGIN_px) / width, 1 - (2 * MARGIN_px) / height]);
     if (this.labelsDue && now_ms - this.labelled_ms >= LABEL_INTERVAL_ms) {
       this.labelsDue = false;
       this.labelled_ms = now_ms;
@@ -137,8 +140,8 @@ export class PadView {
       canvas.height = Math.round(height * dense);
     }
     this.camera = null;
-    if (!this.turned) {
-      this.look = { ...this.aslant };
+    if (!this.turned || this.fromAbove) {
+      this.look = this.lookOf(this.fromAbove);
     }
   }
 
@@ -146,7 +149,7 @@ export class PadView {
     this.turned = true;
     this.look = {
       turn_deg: ((look.turn_deg + 540) % 360) - 180,
-      tilt_deg: Math.min(90, Math.max(12, look.tilt_deg)),
+      tilt_deg: Math.min(ABOVE_deg, Math.max(12, look.tilt_deg)),
     };
     this.camera = null;
     this.repaint();
@@ -223,7 +226,7 @@ export class PadView {
         ArrowRight: { turn_deg: turn_deg + step, tilt_deg },
         ArrowUp: { turn_deg, tilt_deg: tilt_deg + step },
         ArrowDown: { turn_deg, tilt_deg: tilt_deg - step },
-        Home: this.fromAbove ? this.aslant : FROM_ABOVE,
+        Home: this.lookOf(!this.fromAbove),
       };
       const look = turns[event.key];
       if (look && !event.ctrlKey && !event.metaKey && !event.altKey) {
@@ -263,29 +266,28 @@ export class PadView {
       pen.fillStyle = colour;
       pen.fillText(text, x, y);
     };
-    for (let k = 0; k < scene.count; k++) {
-      const x_mm = scene.layout.x_mm[k] ?? 0;
-      const y_mm = scene.layout.y_mm[k] ?? 0;
-      const pressure_Pa = scene.pressure_Pa[k];
-      const name = `${k}${scene.broken[k] ? ' ×' : scene.doubtful[k] ? '?' : ''}`;
-      const colour = palette.css(scene.broken[k] ? 'bad' : scene.doubtful[k] ? 'warning' : 'faint');
-      pen.font = `${px * 0.85}px system-ui, sans-serif`;
-      write(name, ...at(x_mm, y_mm - 3.6, 0), colour, cssOf(halo));
-      const value = scene.saturated[k]
-        ? 'max'
-        : typeof pressure_Pa === 'number' && pressure_Pa > NOTED_Pa
-          ? (pressure_Pa / 1000).toFixed(pressure_Pa < 9950 ? 1 : 0)
-          : null;
-      if (value !== null) {
-        const part = scene.saturated[k] ? 1 : heatPart(pressure_Pa ?? 0);
-        const [x, y] = at(x_mm, y_mm, part * HEIGHT_mm);
-        pen.font = `600 ${px}px system-ui, sans-serif`;
+    const sensors = Array.from({ length: scene.count }, (_, k) => ({ k, x_mm: scene.layout.x_mm[k], y_mm: scene.layout.y_mm[k] }));
+    const values: [number, number][] = [];
+    pen.font = `600 ${px}px system-ui, sans-serif`;
+    for (const { k, x_mm, y_mm } of sensors) {
+      const pressure_Pa = scene.saturated[k] ? Infinity : (scene.pressure_Pa[k] ?? 0);
+      if (pressure_Pa > NOTED_Pa) {
+        const [x, y] = at(x_mm, y_mm, heatPart(pressure_Pa) * HEIGHT_mm);
+        values.push([x, flat ? y : y - px * 0.8]);
         const behind = scene.fit && flat ? mix(halo, palette.of('surface'), 0.2) : halo;
-        write(value, x, flat ? y : y - px * 0.8, palette.css('text'), cssOf(behind));
+        const text = scene.saturated[k] ? 'max' : (pressure_Pa / 1000).toFixed(pressure_Pa < 9950 ? 1 : 0);
+        write(text, ...values[values.length - 1], palette.css('text'), cssOf(behind));
+      }
+    }
+    pen.font = `${px * 0.85}px system-ui, sans-serif`;
+    for (const { k, x_mm, y_mm } of sensors) {
+      const doubt = scene.broken[k] ? ' ×' : scene.doubtful[k] ? '?' : '';
+      const [x, y] = at(x_mm, y_mm - 3.6, 0);
+      if (doubt || !values.some((value) => Math.abs(value[0] - x) < 2 * px && Math.abs(value[1] - y) < px)) {
+        write(`${k}${doubt}`, x, y, palette.css(scene.broken[k] ? 'bad' : doubt ? 'warning' : 'faint'), cssOf(halo));
       }
     }
     this.axes(pen, palette, at);
-    this.scale(pen, palette, height);
   }
 
   /** Millimetres on the edges of the surface that are nearest to the viewer. */
@@ -304,31 +306,22 @@ export class PadView {
       const most = Math.floor(reach_mm / TICK_STEP_mm);
       for (let i = -most; i <= most; i++) {
         const along_mm = i * TICK_STEP_mm;
+        const [[x, y], [x_out, y_out]] = [place(along_mm, 0), place(along_mm, 1)];
+        const far = 1 / Math.hypot(x_out - x, y_out - y);
+        const out = (px: number): [number, number] => [x + px * far * (x_out - x), y + px * far * (y_out - y)];
         pen.beginPath();
-        pen.moveTo(...place(along_mm, 0));
-        pen.lineTo(...place(along_mm, TICK_mm));
+        pen.moveTo(x, y);
+        pen.lineTo(...out(TICK_px));
         pen.stroke();
-        pen.fillText(i === most ? `${name} ${along_mm} mm` : String(along_mm).replace('-', '−'), ...place(along_mm, NUMBER_mm));
+        const [x_text, y_text] = out(NUMBER_px);
+        pen.fillText(String(along_mm).replace('-', '−'), x_text, y_text);
+        if (i === most) {
+          const is_below = Math.abs(y_out - y) > Math.abs(x_out - x);
+          pen.fillText(`${name} mm`, x_text, y_text + (is_below ? NAME_px : -NAME_px));
+        }
       }
     };
     axis('x', x_mm, (along_mm, out_mm) => at(along_mm, front * (y_mm + out_mm), 0));
     axis('y', y_mm, (along_mm, out_mm) => at(side * (x_mm + out_mm), along_mm, 0));
-  }
-
-  private scale(pen: CanvasRenderingContext2D, palette: Palette, height: number): void {
-    const long = Math.min(150, height * 0.4);
-    const x = 12;
-    const bottom = height - 16;
-    for (let i = 0; i < long; i++) {
-      pen.fillStyle = cssOf(heatOf(palette, i / long));
-      pen.fillRect(x, bottom - i - 1, 8, 1.5);
-    }
-    pen.font = '11px system-ui, sans-serif';
-    pen.textAlign = 'left';
-    pen.fillStyle = palette.css('faint');
-    for (const tick_kPa of [1, 5, 20, 50, 100]) {
-      pen.fillText(String(tick_kPa), x + 13, bottom - long * Math.sqrt(tick_kPa / 100));
-    }
-    pen.fillText('kPa', x, bottom - long - 14);
   }
 }

@@ -3,9 +3,9 @@ import { Flag } from '../line/line_facts';
 import { FLAGS } from '../model/flags';
 import uPlot from 'uplot';
 import { Buckets, intervalOf, roundAbove, type ColumnName } from './buckets';
-import { chartOf, clock, spansOf, type Chart, type Span } from './curves';
+import { chartOf, clock, spansOf, ticksOf, type Chart, type Span } from './curves';
 import { element } from './elements';
-import { FINGERS, cssOf, type Palette } from './palette';
+import { FINGERS, type Palette } from './palette';
 import type { History } from '../model/history';
 import type { Shown } from './shown';
 
@@ -17,11 +17,15 @@ const MOST_INTERVALS = 1400;
 const MOST_N = 50;
 /** A load below this is hardly more than its standard deviation: no axis is made for it. */
 const LEAST_PULL_N = 0.5;
-const ROW_px = 15;
+/** Of the strip of flags: a name, below it a bar. */
+const ROW_px = 17;
+const BAR_px = 4;
 const TITLE_px = 20;
 const TIMES_px = 22;
 /** The least height at which a plot can be read. */
-const LEAST_PLOT_px = 40;
+const LEAST_PLOT_px = 44;
+/** From one tick to the next. */
+const TICK_px = 24;
 const MOST_PLOT_px = 240;
 /** Longer between frames than this, and a line is broken. */
 const BREAK_s = 0.25;
@@ -212,7 +216,12 @@ export class Traces {
           space: 70,
           values: (_chart, times) => times.map((t_s) => (t_s < 0 ? '' : clock(t_s))),
         },
-        { ...axis, size: AXIS_px, gap: 4, space: 17 },
+        {
+          ...axis,
+          size: AXIS_px,
+          gap: 4,
+          splits: (chart, _axis, low, high) => ticksOf(low, high, chart.bbox.height / devicePixelRatio / TICK_px),
+        },
       ],
       series: [
         {},
@@ -306,25 +315,18 @@ export class Traces {
     const x = (t_s: number) =>
       AXIS_px + (inner * Math.min(Math.max(t_s - span.from_s, 0), span.to_s - span.from_s)) / (span.to_s - span.from_s);
     pen.font = '11px system-ui, sans-serif';
-    pen.textBaseline = 'middle';
+    pen.textBaseline = 'bottom';
     rows.forEach((row, i) => {
-      const y = i * ROW_px + 2;
+      const y = i * ROW_px + ROW_px - BAR_px;
       pen.fillStyle = palette.css('raised');
-      pen.fillRect(AXIS_px, y, inner, ROW_px - 3);
+      pen.fillRect(AXIS_px, y, inner, BAR_px);
       pen.fillStyle = palette.css(row.colour);
-      pen.globalAlpha = row.colour === 'accent' ? 0.45 : 0.6;
       for (const { from_s, to_s } of row.spans) {
         const left = x(from_s);
-        pen.fillRect(left, y, Math.max(x(to_s) - left, 1.5), ROW_px - 3);
+        pen.fillRect(left, y, Math.max(x(to_s) - left, 1.5), BAR_px);
       }
-      pen.globalAlpha = 1;
-      pen.strokeStyle = cssOf(palette.of('surface'));
-      pen.lineWidth = 3;
-      pen.lineJoin = 'round';
-      const name = shortened(pen, row.name, inner - 10);
-      pen.strokeText(name, AXIS_px + 5, y + (ROW_px - 3) / 2 + 0.5);
-      pen.fillStyle = palette.css('text');
-      pen.fillText(name, AXIS_px + 5, y + (ROW_px - 3) / 2 + 0.5);
+      pen.fillStyle = palette.css(row.spans.length > 0 ? 'text' : 'faint');
+      pen.fillText(shortened(pen, row.name, inner), AXIS_px, y - 1);
     });
   }
 }
