@@ -1,14 +1,12 @@
 """What grasp.py measured as a picture."""
 
-from presentation import BLUE, FAINT, GOAL, INK, ORANGE, plt, save, text_of
+from presentation import BLUE, FAINT, GOAL, INK, ORANGE, plt, save, text_of, tidy
 from kinds import GRIPPERS
 
 
-def tidy(axes, title, label):
-    axes.set_title(title, loc="left", size=10, color=INK)
+def labelled(axes, title, label, up=""):
+    tidy(axes, title, up, grid="both")
     axes.set_xlabel(label, size=9)
-    axes.tick_params(labelsize=8)
-    axes.grid()
 
 
 def draw_distribution(axes, found, key, title, label, most):
@@ -19,8 +17,7 @@ def draw_distribution(axes, found, key, title, label, most):
     axes.set_xlim(0, most)
     axes.set_ylim(0, 100)
     axes.legend(fontsize=8, loc="lower right")
-    tidy(axes, title, label)
-    axes.set_ylabel("% below", size=9)
+    labelled(axes, title, label, "% below")
 
 
 def draw_drops(axes, found):
@@ -36,12 +33,13 @@ def draw_drops(axes, found):
     axes.invert_yaxis()
     axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=3)
     counts = sorted({row["grasps"] for row in found["kinds"]})
-    tidy(axes, "Dropped", f"% of {' to '.join(str(count) for count in dict.fromkeys((counts[0], counts[-1])))} grasps")
+    labelled(axes, "Dropped", f"% of {' to '.join(str(count) for count in dict.fromkeys((counts[0], counts[-1])))} grasps")
 
 
-def draw_caught(axes, series, title):
-    begin = series["begin_s"]
-    t_ms = [1e3 * (at - begin) for at in series["lift_s"]]
+def draw_caught(axes, caught):
+    series = caught["series"]
+    t_ms = [1e3 * (at - caught["begin_s"]) for at in series["lift_s"]]
+    slid_from_mm = series["slid_mm"][min(range(len(t_ms)), key=lambda i: abs(t_ms[i]))]
     for key, colour, label in (
         ("force_N", BLUE, "grip"),
         ("sensed_N", FAINT, "as measured"),
@@ -49,12 +47,13 @@ def draw_caught(axes, series, title):
         ("load_N", ORANGE, "load of a fingertip"),
     ):
         axes.plot(t_ms, series[key], color=colour, lw=1, label=label)
-    axes.plot(t_ms, [value - series["slid_from_mm"] for value in series["slid_mm"]], color=INK, lw=1.4, label="slid, mm")
+    axes.plot(t_ms, [value - slid_from_mm for value in series["slid_mm"]], color=INK, lw=1.4, label="slid, mm")
     axes.set_xlim(-80, 300)
     shown = [i for i, at in enumerate(t_ms) if -80 <= at <= 300]
     axes.set_ylim(0, 1.15 * max(series["force_N"][i] for i in shown))
     axes.legend(fontsize=7, loc="upper left", ncols=3)
-    tidy(axes, title, "ms since it began to slide; N, and mm that it slid")
+    what = f"{caught['mass_kg']:.2f} kg, friction {caught['friction']:.2f}, {caught['gripper']}, {' and '.join(caught['events'])}"
+    labelled(axes, f"A slip that is caught: {what}", "ms since it began to slide; N, and mm that it slid")
 
 
 def draw(found, path):
@@ -66,13 +65,6 @@ def draw(found, path):
     draw_distribution(places[2], found, "reaction_ms", "From slip to 5 % more grip", "ms", 120)
     draw_distribution(places[3], found, "slid_mm", "Slid in all, what was not dropped", "mm", 6)
     if "caught" in found:
-        caught = found["caught"]
-        series = {**caught["series"], "begin_s": caught["begin_s"]}
-        start = min(range(len(series["lift_s"])), key=lambda i: abs(series["lift_s"][i] - caught["begin_s"]))
-        series["slid_from_mm"] = series["slid_mm"][start]
-        object_text = (
-            f"{caught['mass_kg']:.2f} kg, friction {caught['friction']:.2f}, {caught['gripper']}, {' and '.join(caught['events'])}"
-        )
-        draw_caught(below.subplots(), series, f"A slip that is caught: {object_text}")
+        draw_caught(below.subplots(), found["caught"])
     figure.suptitle("Grasps: simulated, the tool's own controller", x=0.01, ha="left", size=12, weight="bold")
     save(figure, path)

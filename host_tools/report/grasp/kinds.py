@@ -18,39 +18,8 @@ from reporting import built, figures_printed  # noqa: E402
 # model: what the figures call it, its colour
 GRIPPERS = {"2f85": ("2f85", ORANGE), "sts3215": ("servo", BLUE), "ideal": ("ideal", GOAL)}
 CALLED = {model: called for model, (called, _) in GRIPPERS.items()}
-# figure: its limits, by gripper
-BY_GRIPPER = {
-    "drops_percent": (2, 2, 1),
-    "peak_over_need_p50": (2.2, 2.0, 1.8),
-    "reaction_ms": (41, None, None),
-    # Of a set force of 8 to 15 N.
-    "settle_s": (1.2, 1.2, 1.2),
-    "hold_rms_percent": (5, 5, 5),
-}
-# Of the median margin, whatever the gripper; by what touches the pads.
+# Of the median margin, whatever the gripper: its limit, by what touches the pads.
 BY_SHAPE = {"ball": (("ball",), 2.2), "cylinder": (("upright", "lying"), 4), "box": (("box",), 4), "plate": (("plate",), 6)}
-GOALS = tuple(
-    (f"{name}_{called}", "<=", limit)
-    for name, limits in BY_GRIPPER.items()
-    for called, limit in zip(CALLED.values(), limits)
-    if limit is not None
-) + (
-    *((f"margin_median_{shape}", "<=", limit) for shape, (_, limit) in BY_SHAPE.items()),
-    ("slick_drops_percent_worst", "<=", 3),
-    ("peak_over_need_p95_worst", "<=", 4),
-    ("hunting_percent_worst", "<=", 2),
-    ("crushed_percent", "<=", 0),
-    ("dropped_fragile_percent", "<=", 1),
-    ("over_cap", "<=", 0),
-    ("first_grip_over_2x_percent", "<=", 0.5),
-    ("first_grip_below_wanted_half_percent", "<=", 0),
-    ("late_40ms_drops_percent", "<=", 3),
-    ("friction_below_0.6_of_true_percent", "<=", 5),
-    ("step_us", "<=", 20),
-    ("limit_cycles", "<=", 0),
-    ("one_bad_frame_squeezed", "<=", 0),
-    ("lasting_bad_squeezed_percent", "<=", 2),
-)
 CONTROLLERS = ("ours", "textbook", "fixed", "paper")
 MIXED = ("--kind", "usual,rough")
 # row: its options, whether it is judged; the others' controllers are beside it
@@ -166,47 +135,61 @@ def summary_of_wrong(each):
     }
 
 
-def worst(rows, key, name=None):
-    values = [row[key] for row in rows if row["controller"] == "ours" and (name is None or row["row"] == name) and row[key] is not None]
-    return max(values) if values else None
+def worst(key, name=None):
+    """Of rows of ours with this name, or of all."""
+
+    def found(ours, _sets, _wrong):
+        return max((row[key] for row in ours if name in (None, row["row"]) and row[key] is not None), default=None)
+
+    return found
+
+
+# figure: its limits, by gripper, and its name in the rows BASE
+BY_GRIPPER = {
+    "drops_percent": ((2, 2, 1), "drops_percent"),
+    "peak_over_need_p50": ((2.2, 2.0, 1.8), "peak_over_need_p50"),
+    "reaction_ms": ((41, None, None), "reaction_p50_ms"),
+    "settle_s": ((1.2, 1.2, 1.2), "firm_settle_p50_s"),
+    "hold_rms_percent": ((5, 5, 5), "firm_rms_p50_percent"),
+}
+BASE = ("usual and rough", "12 s")
+# figure: its limit, how it is found in the rows of ours, of set forces and of wrong readings
+JUDGED = {
+    "slick_drops_percent_worst": (3, worst("drops_percent", "slick")),
+    "peak_over_need_p95_worst": (4, worst("peak_over_need_p95", "usual and rough")),
+    "hunting_percent_worst": (2, worst("hunting_percent", "usual and rough")),
+    "crushed_percent": (0, worst("crushed_percent", "fragile")),
+    "dropped_fragile_percent": (1, worst("drops_percent", "fragile")),
+    "over_cap": (0, lambda ours, sets, wrong: sum(row["over_cap"] for row in ours)),
+    "first_grip_over_2x_percent": (0.5, worst("first_grip_over_2x_percent", "usual and rough")),
+    "first_grip_below_wanted_half_percent": (0, worst("first_grip_below_wanted_half_percent", "usual and rough")),
+    "late_40ms_drops_percent": (3, worst("drops_percent", "usual and rough, 40 ms later")),
+    "turned_unreported_percent": (None, worst("turned_unreported_percent", "usual and rough")),
+    "friction_below_0.6_of_true_percent": (5, worst("friction_below_0.6_of_true_percent", "usual and rough")),
+    "step_us": (20, worst("step_us")),
+    "limit_cycles": (0, lambda ours, sets, wrong: sum(row["limit_cycles"] for row in sets if row["row"] != "12 s")),
+    "one_bad_frame_squeezed": (0, lambda ours, sets, wrong: sum(row["squeezed"] for row in wrong if row["wrong"] in WRONG_SHORT)),
+    "lasting_bad_squeezed_percent": (
+        2,
+        lambda ours, sets, wrong: max((row["squeezed_percent"] or 0 for row in wrong if row["wrong"] in WRONG), default=None),
+    ),
+}
+LIMITS = {f"{name}_{called}": limit for name, (limits, _) in BY_GRIPPER.items() for called, limit in zip(CALLED.values(), limits)}
+LIMITS |= {f"margin_median_{shape}": limit for shape, (_, limit) in BY_SHAPE.items()} | {name: limit for name, (limit, _) in JUDGED.items()}
+GOALS = tuple((name, "<=", limit) for name, limit in LIMITS.items() if limit is not None)
 
 
 def figures(rows, sets, shapes, wrong):
     """What is judged, of all rows of ours."""
+    ours = [row for row in rows if row["controller"] == "ours"]
     found = {}
     for row in shapes:
         name, margin = f"margin_median_{row['shape']}", row["margin_p50"]
         found[name] = max((value for value in (margin, found.get(name)) if value is not None), default=None)
-    for row in rows:
-        if row["controller"] == "ours" and row["row"] == "usual and rough":
-            called = CALLED[row["gripper"]]
-            for name, key in (
-                ("drops_percent", "drops_percent"),
-                ("peak_over_need_p50", "peak_over_need_p50"),
-                ("reaction_ms", "reaction_p50_ms"),
-            ):
-                found[f"{name}_{called}"] = row[key]
-    for row in sets:
-        called = CALLED[row["gripper"]]
-        if row["row"] == "12 s":
-            found |= {f"settle_s_{called}": row["firm_settle_p50_s"], f"hold_rms_percent_{called}": row["firm_rms_p50_percent"]}
-    return found | {
-        "slick_drops_percent_worst": worst(rows, "drops_percent", "slick"),
-        "peak_over_need_p95_worst": worst(rows, "peak_over_need_p95", "usual and rough"),
-        "hunting_percent_worst": worst(rows, "hunting_percent", "usual and rough"),
-        "crushed_percent": worst(rows, "crushed_percent", "fragile"),
-        "dropped_fragile_percent": worst(rows, "drops_percent", "fragile"),
-        "over_cap": sum(row["over_cap"] for row in rows if row["controller"] == "ours"),
-        "first_grip_over_2x_percent": worst(rows, "first_grip_over_2x_percent", "usual and rough"),
-        "first_grip_below_wanted_half_percent": worst(rows, "first_grip_below_wanted_half_percent", "usual and rough"),
-        "late_40ms_drops_percent": worst(rows, "drops_percent", "usual and rough, 40 ms later"),
-        "turned_unreported_percent": worst(rows, "turned_unreported_percent", "usual and rough"),
-        "friction_below_0.6_of_true_percent": worst(rows, "friction_below_0.6_of_true_percent", "usual and rough"),
-        "step_us": worst(rows, "step_us"),
-        "limit_cycles": sum(row["limit_cycles"] for row in sets if row["row"] in ("60 s", "12 s, eq. (5) and (6)")),
-        "one_bad_frame_squeezed": sum(row["squeezed"] for row in wrong if row["wrong"] in WRONG_SHORT),
-        "lasting_bad_squeezed_percent": max((row["squeezed_percent"] or 0 for row in wrong if row["wrong"] in WRONG), default=None),
-    }
+    for row in ours + sets:
+        if row["row"] in BASE:
+            found |= {f"{name}_{CALLED[row['gripper']]}": row[key] for name, (_, key) in BY_GRIPPER.items() if key in row}
+    return found | {name: find(ours, sets, wrong) for name, (_, find) in JUDGED.items()}
 
 
 def caught(each):
