@@ -22,8 +22,7 @@ static GripperTraits traits_of(const fingertip_grip_traits &given) {
   if (given.speed_min_mm_s > given.speed_max_mm_s || given.force_min_N > given.force_max_N) {
     throw Error(ErrorCode::bad_value, "a gripper's traits have a least speed or force above the largest");
   }
-  return {"gripper",         given.stroke_mm,   given.step_mm,   given.deadband_mm, given.speed_min_mm_s, given.speed_max_mm_s,
-          given.force_min_N, given.force_max_N, given.latency_s, given.poll_s};
+  return {given, "gripper"};
 }
 
 using Values = std::map<std::string, double>; // by the name of the option, in its unit

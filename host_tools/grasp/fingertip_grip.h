@@ -94,11 +94,11 @@ enum fingertip_grip_motion {
   GRIP_MOVE
 };
 
-/* Of the gripper, all at least 0; stroke, step and both speeds above 0; each least at most the largest. gripper.hpp has the same
- * fields; grip_table.py lists those of the known models. */
+/* Of the gripper, all at least 0; stroke, step and both speeds above 0; each least at most the largest. grip_table.py lists those of
+ * the known models. */
 struct fingertip_grip_traits {
   double stroke_mm;   /* width between the pads when open */
-  double step_mm;     /* of the commanded width */
+  double step_mm;     /* of the commanded width; of a servo's jaw the largest */
   double deadband_mm; /* moves shorter than this are not made */
   double speed_min_mm_s, speed_max_mm_s;
   double force_min_N, force_max_N; /* of its own limit of force; 0: it has none */

@@ -36,8 +36,6 @@ GraspLoop::~GraspLoop() {
   }
 }
 
-double GraspLoop::read_until_us() const { return std::min(loops_[0]->read_until_us(), loops_[1]->read_until_us()); }
-
 std::array<DeviceNews, GraspLoop::FINGERS> GraspLoop::meet(const std::function<bool()> &stop) {
   std::array<std::optional<DeviceNews>, FINGERS> ready;
   while (!ready[0] || !ready[1]) {
@@ -102,8 +100,6 @@ void GraspLoop::put(GraspNews news) {
   news_.push_back(std::move(news));
   filled_.set();
 }
-
-void GraspLoop::end() { end_ = true; }
 
 void GraspLoop::rethrow() const {
   for (const auto &loop : loops_) {

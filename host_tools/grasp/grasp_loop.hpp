@@ -78,7 +78,7 @@ public:
   std::string name(std::size_t finger) const { return loops_[finger]->name(); }
   LineStatistics statistics(std::size_t finger) const { return loops_[finger]->statistics(); }
   // The earlier of both DeviceLoops' read_until_us.
-  double read_until_us() const;
+  double read_until_us() const { return std::min(loops_[0]->read_until_us(), loops_[1]->read_until_us()); }
 
   // Their news of kind ready, once both have answered. Throws Error, and Interrupted once stop reports so.
   std::array<DeviceNews, FINGERS> meet(const std::function<bool()> &stop);
@@ -92,7 +92,7 @@ public:
   // All there is, waiting at most this long for the first.
   std::vector<GraspNews> take(std::chrono::milliseconds timeout);
   // The width stays, streams end; news come until the one of kind ended.
-  void end();
+  void end() { end_ = true; }
   // After it: what ended a fingertip, if it was an error.
   void rethrow() const;
 

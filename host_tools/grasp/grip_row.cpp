@@ -124,10 +124,9 @@ GripRow grip_row(std::string_view value) {
     wrong("time_us", cells[0]);
   }
   row.time_us = *time_us;
-  for (std::size_t i = 0; i < columns().size(); i++) {
-    if (std::string_view(columns()[i].name) == "status_us" && !cells[i + 1].empty()) {
-      row.status.emplace();
-    }
+  const Column *since = find_in(columns(), [](const Column &column) { return std::string_view(column.name) == "status_us"; });
+  if (!cells[static_cast<std::size_t>(since - columns().data()) + 1].empty()) {
+    row.status.emplace();
   }
   for (std::size_t i = 0; i < columns().size(); i++) {
     const Column &column = columns()[i];

@@ -149,9 +149,7 @@ Metadata settings_metadata(const GripSettings &settings) {
   Metadata all = {{"grasp_mode", settings.mode == GRIP_MODE_FIXED ? "fixed" : "hold"}};
   for (const GraspSetting &setting : grasp_settings()) {
     std::string key = std::string("grasp_") + setting.name;
-    for (char &c : key) {
-      c = c == '-' ? '_' : c;
-    }
+    std::replace(key.begin(), key.end(), '-', '_');
     std::string value = shortest(static_cast<float>(value_of(setting, settings)));
     all.emplace_back(key, value + (*setting.unit ? " " : "") + setting.unit);
   }

@@ -1,7 +1,6 @@
 // The gripper clients, and whatever answers on their line: a Robotiq by Modbus, a Feetech servo.
 #include "fuzz.h"
 #include "grasp/gripper/feetech.hpp"
-#include "grasp/gripper/feetech_table.hpp"
 #include "grasp/gripper/gripper.hpp"
 #include "libfingertip/served_port.hpp"
 

@@ -64,7 +64,7 @@ public:
     state_->opened++;
   }
   const fingertip::GripperTraits &traits() const override {
-    static const fingertip::GripperTraits own = {"fake", 50.0, 0.05, 0.0, 1.0, 100.0, 0.0, 0.0, 0.01, 0.002};
+    static const fingertip::GripperTraits own = {{50.0, 0.05, 0.0, 1.0, 100.0, 0.0, 0.0, 0.01, 0.002}, "fake"};
     return own;
   }
   std::string line() const override { return "no line"; }

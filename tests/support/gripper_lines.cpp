@@ -113,12 +113,12 @@ std::string with_crc(const std::string &bytes) {
 std::string asked(const std::string &port, const std::string &question, std::size_t answer_length) {
   SerialLine line(port, 115200);
   const Bytes sent = bytes_of(question);
-  line.transport().write(sent.data(), sent.size());
+  line.write(sent.data(), sent.size());
   Bytes came;
   while (came.size() < answer_length) {
     std::uint8_t bytes[64];
     std::size_t length = 0;
-    if (line.transport().read(bytes, sizeof bytes, &length, std::chrono::milliseconds(2000)) != Transport::Result::data) {
+    if (line.read(bytes, sizeof bytes, &length, std::chrono::milliseconds(2000)) != Transport::Result::data) {
       break;
     }
     came.insert(came.end(), bytes, bytes + length);

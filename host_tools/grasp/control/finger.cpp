@@ -191,8 +191,6 @@ void GripFinger::doubt(const GripReading &reading) {
   is_doubted_ = true;
 }
 
-double GripFinger::doubted_for_s(const GripReading &reading) const { return is_doubted_ ? reading.t_s - doubted_s_ : 0.0; }
-
 using Readings = std::array<GripReading, GRIP_FINGERS>;
 
 // Replaces a reading that is doubted by the last one that was believed, or leaves the fingertip out.
@@ -247,10 +245,9 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
     }
   }
   GripReadings all;
-  all.low_N = all.t_s = std::numeric_limits<double>::infinity();
+  all.low_N = all.t_s = all.speed_mm_s = std::numeric_limits<double>::infinity();
   double loads_N = 0.0, most_N = 0.0, normal_N = 0.0, most_pull_N = 0.0, least_pull_N = all.low_N;
   int loads = 0, marked = 0;
-  all.speed_mm_s = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < fingers.size(); i++) {
     const GripReading &reading = readings[i];
     all.trouble |= reading.trouble << i;

@@ -56,7 +56,8 @@ public:
   const GripReading &believed() const { return believed_; }
   void believe(const GripReading &reading);
   void doubt(const GripReading &reading);
-  double doubted_for_s(const GripReading &reading) const; // since the first frame that was doubted
+  // Since the first frame that was doubted.
+  double doubted_for_s(const GripReading &reading) const { return is_doubted_ ? reading.t_s - doubted_s_ : 0.0; }
 
   // keeps and pull_N are of the present load from now on. False: it is smaller than this. is_marked: it was not, and frames come.
   bool mark(double least_N);

@@ -31,8 +31,6 @@ constexpr double WIDTH_SLACK_mm = 1.0; // rounding of the gripper's own units
 constexpr double MARGIN_MOST = 100.0;
 constexpr double ONLY_HELD_s = 1.0; // without a load for this time
 
-static double seconds(const GripperStatus &status) { return 1e-6 * static_cast<double>(status.host_us); }
-
 Grip::Grip(const GripSettings &settings, const GripperTraits &traits) : settings_(settings), traits_(traits), reach_(traits) {}
 
 void Grip::take(std::size_t finger, const GripTouch &touch) {
@@ -47,7 +45,7 @@ void Grip::take(const GripperStatus &status) {
   }
   const bool was_bad = hears_status_ && (status_.fault != 0 || !status_.active);
   const bool is_bad = status.fault != 0 || !status.active;
-  fault_s_ = is_bad && was_bad ? fault_s_ : seconds(status);
+  fault_s_ = is_bad && was_bad ? fault_s_ : status.t_s();
   status_ = status;
   hears_status_ = true;
   reach_.take(status, settings_.silent_s);
@@ -57,11 +55,6 @@ void Grip::enter(GripState state) {
   state_ = state;
   since_s_ = now_s_;
   is_entered_ = true;
-}
-
-bool Grip::is_grasping() const {
-  return state_ == GRIP_SQUEEZE || state_ == GRIP_READY || state_ == GRIP_HOLDING || state_ == GRIP_SLIPPING || state_ == GRIP_PLACING ||
-         state_ == GRIP_HANDING || (state_ == GRIP_STILL && still_grasps_);
 }
 
 bool Grip::mark(double least_N) {
@@ -123,18 +116,16 @@ bool Grip::change(const GripSettings &settings) {
 }
 
 std::uint32_t Grip::gripper_trouble() {
-  if (!hears_status_ || now_s_ > seconds(status_) + settings_.silent_s) {
+  if (!hears_status_ || now_s_ > status_.t_s() + settings_.silent_s) {
     return GRIP_GRIPPER_SILENT;
   }
   // A single bad answer may be a transmission error.
-  if (seconds(status_) - fault_s_ < AGAIN_s) {
+  if (status_.t_s() - fault_s_ < AGAIN_s) {
     return 0;
   }
   const bool was_active = state_ > GRIP_ACTIVATING;
   return (status_.fault != 0 ? GRIP_GRIPPER_FAULT : 0u) | (was_active && !status_.active ? GRIP_GRIPPER_INACTIVE : 0u);
 }
-
-double Grip::dead_s() const { return readings_.delay_s + traits_.latency_s + reach_.poll_s(); }
 
 double Grip::start_force() const {
   return settings_.mode == GRIP_MODE_FIXED ? settings_.set_N : is_blind_ ? settings_.unseen_N() : settings_.first_N();
@@ -166,7 +157,7 @@ void Grip::approach() {
     return;
   }
   const bool blind = readings_.fingers == 0 && readings_.touches == 0;
-  if (blind || now_s_ > seconds(status_) + WIDTH_STALE_s) {
+  if (blind || now_s_ > status_.t_s() + WIDTH_STALE_s) {
     ramped_s_ = now_s_;
     return;
   }
@@ -248,9 +239,8 @@ std::uint32_t Grip::squeeze() {
 }
 
 std::uint32_t Grip::make_ready() {
-  const bool fixed = settings_.mode == GRIP_MODE_FIXED;
-  const std::uint32_t trouble = fixed ? fixed_.step(readings_, settings_, traits_, now_s_, reach_)
-                                      : aim({start_force(), GripAim::Haste::patient, settings_.sets_force()});
+  const std::uint32_t trouble = settings_.mode == GRIP_MODE_FIXED ? fixed_.step(readings_, settings_, traits_, now_s_, reach_)
+                                                                  : aim({start_force(), GripAim::Haste::patient, settings_.sets_force()});
   if (now_s_ - since_s_ >= READY_s && fingers_[0].has_zero() && fingers_[1].has_zero()) {
     for (GripFinger &finger : fingers_) {
       finger.end_zero();
@@ -315,7 +305,7 @@ std::uint32_t Grip::go_on() {
   case GRIP_ACTIVATING:
     if (status_.active) {
       reach_.stop();
-      reach_.first_touch(seconds(status_));
+      reach_.first_touch(status_.t_s());
       enter(readings_.touches == 0 ? GRIP_APPROACH : GRIP_SQUEEZE);
       return 0;
     }
@@ -359,12 +349,12 @@ void Grip::fill(GripCommand &command) const {
   case GRIP_ACTIVATING: command.motion = may_activate_ ? GRIP_ACTIVATE : GRIP_STAY; return;
   case GRIP_APPROACH: speed_mm_s = settings_.approach_mm_s; break;
   case GRIP_RELEASE: speed_mm_s = settings_.release_mm_s; break;
+  case GRIP_SLIPPING: break;
   case GRIP_SQUEEZE:
   case GRIP_READY:
   case GRIP_HOLDING:
   case GRIP_PLACING:
   case GRIP_HANDING: speed_mm_s = std::abs(reach_.target_mm() - status_.width_mm) / MOVE_s; break;
-  case GRIP_SLIPPING: break;
   default: return;
   }
   if ((trouble_ & (GRIP_GRIPPER_SILENT | GRIP_GRIPPER_FAULTS)) != 0) {

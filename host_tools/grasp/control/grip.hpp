@@ -1,12 +1,4 @@
-// The controller of a grasp: frames of two fingertips and a gripper's status in, one command out.
-//
-//   Grip grip(default_settings(traits), traits);
-//   grip.request(GRIP_REQUEST_GRASP);
-//   for (;;) {
-//     grip.take(finger, touch);         for every frame of either fingertip
-//     grip.take(status);                for every answer of the gripper
-//     grip.step(now_s, command);
-//   }
+// The controller of a grasp: frames of two fingertips and a gripper's status in, one command out, called as fingertip_grip.h shows.
 //
 // Two modes. `fixed` holds a set force: De Clercq et al., RA-L 2022, eq. (5) and (6). `hold` holds an object of unknown
 // weight by its load: grip force = margin x tangential force / friction. The grip rises at once where the object
@@ -60,7 +52,7 @@ public:
 
 private:
   void enter(GripState state);
-  bool is_grasping() const;
+  bool is_grasping() const { return (state_ >= GRIP_SQUEEZE && state_ <= GRIP_HANDING) || (state_ == GRIP_STILL && still_grasps_); }
   void sample();
   bool is_gone();
   std::uint32_t gripper_trouble();
@@ -73,7 +65,7 @@ private:
   bool is_taken();
   std::uint32_t aim(const GripAim &aim);
   void ramp(double to_mm, double speed_mm_s);
-  double dead_s() const;
+  double dead_s() const { return readings_.delay_s + traits_.latency_s + reach_.poll_s(); }
   double start_force() const;
   void fill(GripCommand &command) const;
   GripReport report() const;

@@ -73,17 +73,12 @@ double GripRubber::furthest_mm(double from_mm) const { return from_mm - indentat
 void GripRubber::learn(double force_N, double width_mm) {
   if (has_pair_) {
     double &steep = width_mm < pair_mm_ ? closing_ : opening_;
-    const double made_N = force_N - pair_N_;
     const double expected_N = (force_at(width_mm, pair_N_, pair_mm_) - pair_N_) / steep;
-    if (std::abs(expected_N) < TEACHES_N) {
-      has_pair_ = std::abs(width_mm - pair_mm_) > 1e-6; // a way of many small moves teaches too
-      pair_N_ = has_pair_ ? pair_N_ : force_N;
-      pair_mm_ = has_pair_ ? pair_mm_ : width_mm;
-      has_pair_ = true;
-      return;
+    if (std::abs(expected_N) >= TEACHES_N) {
+      steep += LEARNS * (std::clamp((force_N - pair_N_) / expected_N, LEAST_STEEP, MOST_STEEP) - steep);
+    } else if (std::abs(width_mm - pair_mm_) > 1e-6) {
+      return; // a way of many small moves teaches too
     }
-    const double seen = std::clamp(made_N / expected_N, LEAST_STEEP, MOST_STEEP);
-    steep += LEARNS * (seen - steep);
   }
   has_pair_ = true;
   pair_N_ = force_N;
@@ -91,18 +86,13 @@ void GripRubber::learn(double force_N, double width_mm) {
 }
 
 double GripBound::first_N(double way_mm) {
-  double most_N = 0.0;
-  for (const double exponent : EXPONENTS) {
-    most_N = std::max(most_N, EXPECTED_N * std::pow(0.5 * way_mm, exponent));
-  }
-  return most_N;
+  return EXPECTED_N * std::max(std::pow(0.5 * way_mm, EXPONENTS[0]), std::pow(0.5 * way_mm, EXPONENTS[1]));
 }
 
 double GripBound::width_below(double cap_N, double force_N, double from_mm) const {
   double travel_mm = std::numeric_limits<double>::infinity();
+  const double elastic_N = RELAXED * force_N, most_N = std::max(elastic_N + cap_N - force_N, 0.0);
   for (std::size_t i = 0; i < EXPONENTS.size(); i++) {
-    const double elastic_N = RELAXED * force_N;
-    const double most_N = std::max(elastic_N + cap_N - force_N, 0.0);
     travel_mm = std::min(travel_mm, way_to_mm(most_N, at_1_mm_N_[i], EXPONENTS[i]) - way_to_mm(elastic_N, at_1_mm_N_[i], EXPONENTS[i]));
   }
   return from_mm - 2.0 * travel_mm;
@@ -123,17 +113,13 @@ void GripBound::learn(double force_N, double width_mm) {
 }
 
 void GripReach::take(const GripperStatus &status, double silent_s) {
-  const double t_s = 1e-6 * static_cast<double>(status.host_us);
-  if (is_heard_) {
-    const double passed_s = t_s - 1e-6 * static_cast<double>(status_.host_us);
-    // The widths during a silence are unknown.
-    if (passed_s > silent_s) {
-      count_ = 0;
-    } else {
-      poll_s_ += POLL_SHARE * (passed_s - poll_s_);
-    }
-  } else {
+  const double t_s = status.t_s(), passed_s = t_s - status_.t_s();
+  if (!is_heard_) {
     poll_s_ = traits_.poll_s;
+  } else if (passed_s > silent_s) {
+    count_ = 0; // the widths during a silence are unknown
+  } else {
+    poll_s_ += POLL_SHARE * (passed_s - poll_s_);
   }
   stopped_s_ = is_heard_ && !status_.moving ? stopped_s_ : t_s;
   status_ = status;
@@ -165,16 +151,13 @@ double GripReach::width_at(double t_s) const {
 }
 
 bool GripReach::has_stopped(double now_s) const {
-  const double t_s = 1e-6 * static_cast<double>(status_.host_us);
-  const double late_s = std::max(now_s - t_s, 0.0);
-  return !status_.moving && t_s > aimed_s_ + traits_.latency_s + late_s + poll_s_;
+  const double late_s = std::max(now_s - status_.t_s(), 0.0);
+  return !status_.moving && status_.t_s() > aimed_s_ + traits_.latency_s + late_s + poll_s_;
 }
 
 bool GripReach::has_come(double now_s, double frame_s) const {
   return has_stopped(now_s) && frame_s > aimed_s_ + traits_.latency_s + poll_s_ + SHOWS_s;
 }
-
-bool GripReach::rests(double now_s, double frame_s) const { return has_come(now_s, frame_s) && frame_s > stopped_s_; }
 
 void GripReach::first_touch(double t_s) {
   rubber_.begin(width_at(t_s));
@@ -188,13 +171,9 @@ double GripReach::coming_mm(double now_s) const {
   return stays ? status_.width_mm : target_mm_;
 }
 
-double GripReach::least_mm() const { return traits_.step_mm * std::max(1.0, std::ceil(traits_.deadband_mm / traits_.step_mm - 1e-9)); }
-
 bool GripReach::limits_itself(const GripSettings &settings) const {
   return traits_.force_max_N > 0.0 && traits_.force_min_N <= LIMIT * settings.cap_N;
 }
-
-double GripReach::least_move_N(double force_N) const { return rubber_.force_at(target_mm_ - least_mm(), force_N, target_mm_) - force_N; }
 
 double GripReach::coming_N(const GripReadings &readings, double now_s) const {
   return rubber_.force_at(coming_mm(now_s), readings.grip_N, width_at(readings.t_s));
@@ -213,9 +192,7 @@ double GripReach::allowed(double width_mm, const GripReadings &readings, const G
     trouble |= GRIP_AT_TRAVEL_CAP;
   }
   // A force that may be above the cap is never increased.
-  if (width_mm < target_mm_ && (readings.over || readings.fingers == 0)) {
-    width_mm = target_mm_;
-  }
+  width_mm = readings.over || readings.fingers == 0 ? std::max(width_mm, target_mm_) : width_mm;
   // Without a request the gripper opens no further than the width of the touch.
   return std::clamp(width_mm, 0.0, std::max(target_mm_, touch_width_mm()));
 }
@@ -240,10 +217,9 @@ double GripReach::travel_below_cap_mm(const GripReadings &readings, const GripSe
 }
 
 void GripReach::begin_detour(double to_mm, double now_s) {
-  const double coming = coming_mm(now_s);
   in_detour_ = true;
   detour_end_mm_ = to_mm;
-  target_mm_ = std::max(coming, to_mm) + least_mm();
+  target_mm_ = std::max(coming_mm(now_s), to_mm) + least_mm();
   aimed_s_ = now_s;
 }
 
@@ -297,11 +273,6 @@ double GripReach::nearest_steps(double off, double least_mm, bool may_detour) co
   return worth && !(may_detour && detours_ < DETOURS_MOST) ? std::copysign(least, off) : 0.0;
 }
 
-bool GripReach::knows_width(double frame_s, double now_s) const {
-  const double status_s = 1e-6 * static_cast<double>(status_.host_us);
-  return knows(frame_s) && (has_stopped(now_s) || frame_s <= status_s + WIDTH_LAGS_s);
-}
-
 void GripReach::learn(const GripReadings &readings, const GripSettings &settings, double now_s) {
   const double width_mm = width_at(readings.t_s);
   const bool come = has_come(now_s, readings.t_s);
@@ -350,8 +321,6 @@ double GripReach::steps_to(const Outlook &outlook, double wanted_N) const {
   return steps_off(wanted_N, outlook.force_N, outlook.width_mm, outlook.coming_mm);
 }
 
-double GripReach::whole_steps(double mm) const { return traits_.step_mm * std::floor(mm / traits_.step_mm); }
-
 double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings, const GripSettings &settings,
                             std::uint32_t &trouble) const {
   const double steps = aim.nearest ? outlook.nearest_steps : std::ceil(steps_to(outlook, aim.wanted_N - outlook.misses_N) - 1e-6);
@@ -374,10 +343,8 @@ double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const Gr
 
 double GripReach::opened_mm(const Outlook &outlook, const GripAim &aim) const {
   const double least_mm = outlook.least_mm;
-  double way_mm = 0.0;
-  if (aim.nearest) {
-    way_mm = -traits_.step_mm * outlook.nearest_steps;
-  } else {
+  double way_mm = -traits_.step_mm * outlook.nearest_steps;
+  if (!aim.nearest) {
     way_mm = std::min(traits_.step_mm * std::floor(1e-6 - steps_to(outlook, aim.wanted_N + outlook.near_N)),
                       std::max(whole_steps(OPENS_mm), least_mm));
     if (force_at(outlook, outlook.coming_mm + least_mm) >= aim.wanted_N) {
@@ -389,7 +356,8 @@ double GripReach::opened_mm(const Outlook &outlook, const GripAim &aim) const {
 
 std::uint32_t GripReach::aim(const GripAim &aim, const GripReadings &readings, const GripSettings &settings, double now_s) {
   std::uint32_t trouble = 0;
-  if (readings.fingers == 0 || !knows_width(readings.t_s, now_s)) {
+  const bool knows_width = knows(readings.t_s) && (has_stopped(now_s) || readings.t_s <= status_.t_s() + WIDTH_LAGS_s);
+  if (readings.fingers == 0 || !knows_width) {
     return trouble;
   }
   learn(readings, settings, now_s);
@@ -402,12 +370,7 @@ std::uint32_t GripReach::aim(const GripAim &aim, const GripReadings &readings, c
   const Outlook outlook = predict(aim, readings, now_s);
   const bool closes = aim.nearest ? outlook.nearest_steps > 0.0 : outlook.coming_N < aim.wanted_N - outlook.misses_N;
   const bool opens = aim.opens && !closes && !patient && outlook.come && outlook.coming_N - aim.wanted_N > outlook.near_N;
-  double to_mm = outlook.coming_mm;
-  if (closes) {
-    to_mm = closed_mm(outlook, aim, readings, settings, trouble);
-  } else if (opens) {
-    to_mm = opened_mm(outlook, aim);
-  }
+  const double to_mm = closes ? closed_mm(outlook, aim, readings, settings, trouble) : opens ? opened_mm(outlook, aim) : outlook.coming_mm;
   if (to_mm != outlook.coming_mm) {
     const double steps = std::round((to_mm - target_mm_) / traits_.step_mm);
     const double sent_mm = allowed(target_mm_ + steps * traits_.step_mm, readings, settings, trouble);

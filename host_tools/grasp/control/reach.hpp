@@ -5,7 +5,9 @@
 #include "grasp/control/finger.hpp"
 #include "grasp/gripper/gripper.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 namespace fingertip {
@@ -94,7 +96,7 @@ public:
   // The last move is complete, and this frame was measured after it.
   bool has_come(double now_s, double frame_s) const;
   // In addition, the gripper's own answers state that it was not moving when the frame was measured.
-  bool rests(double now_s, double frame_s) const;
+  bool rests(double now_s, double frame_s) const { return has_come(now_s, frame_s) && frame_s > stopped_s_; }
   bool has_stopped(double now_s) const; // the last move is complete
 
   // One fingertip touches at this width; both do. t_s: time of the frames that report it.
@@ -103,9 +105,9 @@ public:
   void approach_ends(double now_s) { aimed_s_ = now_s; } // the gripper is still moving
   double touch_width_mm() const { return rubber_.both_mm(); }
   // The shortest move that a gripper at rest makes.
-  double least_mm() const;
+  double least_mm() const { return traits_.step_mm * std::max(1.0, std::ceil(traits_.deadband_mm / traits_.step_mm - 1e-9)); }
   // The change of this force by that move, from the width that was last sent.
-  double least_move_N(double force_N) const;
+  double least_move_N(double force_N) const { return rubber_.force_at(target_mm_ - least_mm(), force_N, target_mm_) - force_N; }
   // The predicted grip at the width that was last sent.
   double coming_N(const GripReadings &readings, double now_s) const;
   // The furthest whole step from the width last sent that keeps the larger of both forces below the cap.
@@ -148,13 +150,11 @@ private:
     bool come = false;                      // the effect of the last move is measured
     bool exact = false;                     // no force may be missing
   };
-  // Whether the width is known at which this frame was measured.
-  bool knows_width(double frame_s, double now_s) const;
   void learn(const GripReadings &readings, const GripSettings &settings, double now_s);
   Outlook predict(const GripAim &aim, const GripReadings &readings, double now_s) const;
   double force_at(const Outlook &outlook, double width_mm) const;
   double steps_to(const Outlook &outlook, double wanted_N) const;
-  double whole_steps(double mm) const; // rounded down, in mm
+  double whole_steps(double mm) const { return traits_.step_mm * std::floor(mm / traits_.step_mm); } // rounded down, in mm
   // The widths to close and to open to. closed_mm reports a cap that shortens the move.
   double closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings, const GripSettings &settings,
                    std::uint32_t &trouble) const;

@@ -62,7 +62,7 @@ void AskedLine::make_sure() {
 void AskedLine::send(const Bytes &question) {
   line_.drop_input();
   asked_us_ = steady_now_us();
-  if (!line_.transport().write(question.data(), question.size())) {
+  if (!line_.write(question.data(), question.size())) {
     throw Error(ErrorCode::gone, way_.port + ": gone");
   }
 }
@@ -79,7 +79,7 @@ AskedLine::Bytes AskedLine::hear(const Bytes &question, std::size_t length) {
     if (left.count() <= 0) {
       break;
     }
-    if (line_.transport().read(bytes, sizeof bytes, &count, left) == Transport::Result::gone) {
+    if (line_.read(bytes, sizeof bytes, &count, left) == Transport::Result::gone) {
       throw Error(ErrorCode::gone, way_.port + ": gone");
     }
     came.insert(came.end(), bytes, bytes + count);
@@ -110,10 +110,8 @@ AskedLine::Bytes AskedLine::hear(const Bytes &question, std::size_t length) {
                                              std::to_string(std::lround(way_.timeout_s * 1000)) + " ms");
 }
 
-std::chrono::microseconds AskedLine::timeout() const { return std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6)); }
-
-std::string limited_by(const std::string &port, int exchanges) {
-  const std::optional<int> timer_ms = latency_timer_ms(port);
+std::string AskedLine::limited_by(int exchanges) const {
+  const std::optional<int> timer_ms = latency_timer_ms(way_.port);
   if (!timer_ms || *timer_ms <= 1) {
     return "";
   }

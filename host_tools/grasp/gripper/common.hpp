@@ -28,17 +28,17 @@ GripperWay complete(GripperWay way, const GripperUsual &usual);
 // question without an answer another is asked, once, whose answer no other has, and what comes before that is not expected. It waits
 // SURE_TIMEOUTS times as long as any other; where its answer is lost the question with the other number is asked, lest the first come after
 // all. An answer that is late by less than that is never taken for another's.
-class AskedLine {
+class AskedLine : public Gripper {
 public:
   using Bytes = std::vector<std::uint8_t>;
   static constexpr int SURE_TIMEOUTS = 5;
 
   // complete: complete() has made it so.
-  AskedLine(const GripperWay &complete, unsigned baud) : way_(complete), line_(complete.port, baud) {}
+  AskedLine(const GripperWay &complete, unsigned baud, const GripperTraits &traits)
+      : way_(complete), line_(complete.port, baud), traits_(traits) {}
+  const GripperTraits &traits() const override { return traits_; }
 
 protected:
-  ~AskedLine() = default;
-
   enum class Heard { nothing, other_slave, other_answer, fits };
   // Takes the first whole frame out of what came. The payload of one that fits a question; noise counts bytes of no
   // frame. Throws Error: gripper_refused.
@@ -52,21 +52,23 @@ protected:
   void make_sure(); // before every exchange
   void doubt() { doubtful_ = true; }
 
+  // "; the USB adapter's latency timer ..." where that limits the rate of a command of this number of exchanges; "" where it does not.
+  std::string limited_by(int exchanges) const;
+
   const GripperWay way_;
   SerialLine line_;
+  GripperTraits traits_;
+  bool active_ = false;       // by the last status
   std::int64_t asked_us_ = 0; // the last question
 
 private:
   void send(const Bytes &question);
   Bytes hear(const Bytes &question, std::size_t length);
-  std::chrono::microseconds timeout() const;
+  std::chrono::microseconds timeout() const { return std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6)); }
 
   bool doubtful_ = false; // an answer may still come that is not expected
   int sure_number_ = 0;   // which sure question has been asked, 0: none,
   HostTime sure_until_{}; // and is still waited for
 };
-
-// "; the USB adapter's latency timer ..." where that limits the rate of a command of this number of exchanges; "" where it does not.
-std::string limited_by(const std::string &port, int exchanges);
 
 } // namespace fingertip

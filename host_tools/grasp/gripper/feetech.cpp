@@ -12,7 +12,7 @@ namespace fingertip {
 
 namespace feetech {
 
-constexpr std::size_t HEAD = 4; // FF FF id length
+constexpr std::ptrdiff_t HEAD = 4; // FF FF id length
 constexpr std::uint8_t LEAST_LENGTH = 2;
 
 static std::uint8_t checksum(Bytes::const_iterator from, Bytes::const_iterator to) {
@@ -28,37 +28,25 @@ Bytes encoded(const Packet &packet) {
 }
 
 std::optional<Packet> take_packet(Bytes *bytes, std::size_t *skipped) {
-  std::size_t at = 0;
   std::optional<Packet> packet;
-  for (; at < bytes->size() && !packet; at++) {
-    const std::size_t left = bytes->size() - at;
-    const Bytes::const_iterator begin = bytes->begin() + static_cast<std::ptrdiff_t>(at);
-    if (begin[0] != 0xFF || (left > 1 && begin[1] != 0xFF)) {
+  Bytes::const_iterator begin = bytes->begin(), end = begin; // of the packet
+  for (; begin != bytes->end(); end = ++begin) {
+    const std::ptrdiff_t left = bytes->end() - begin;
+    // A third FF: the head begins a byte later.
+    if (begin[0] != 0xFF || (left > 1 && begin[1] != 0xFF) || (left > 2 && begin[2] == 0xFF) || (left > 3 && begin[3] < LEAST_LENGTH)) {
       continue;
     }
-    if (left > 2 && begin[2] == 0xFF) {
-      continue; // the head begins a byte later
-    }
-    if (left < HEAD) {
+    if (left < HEAD || left < HEAD + begin[3]) {
       break;
     }
-    if (begin[3] < LEAST_LENGTH) {
-      continue;
-    }
-    const std::ptrdiff_t size = static_cast<std::ptrdiff_t>(HEAD) + begin[3];
-    if (static_cast<std::ptrdiff_t>(left) < size) {
+    end = begin + HEAD + begin[3];
+    if (checksum(begin + 2, end - 1) == end[-1]) {
+      packet = Packet{begin[2], begin[4], Bytes(begin + 5, end - 1)};
       break;
     }
-    if (checksum(begin + 2, begin + size - 1) != begin[size - 1]) {
-      continue;
-    }
-    packet = Packet{begin[2], begin[4], Bytes(begin + 5, begin + size - 1)};
-    *skipped += at;
-    bytes->erase(bytes->begin(), begin + size);
-    return packet;
   }
-  *skipped += at;
-  bytes->erase(bytes->begin(), bytes->begin() + static_cast<std::ptrdiff_t>(at));
+  *skipped += static_cast<std::size_t>(begin - bytes->begin());
+  bytes->erase(bytes->begin(), end);
   return packet;
 }
 
@@ -88,10 +76,6 @@ static void put_word(Bytes *bytes, int value) {
   bytes->push_back(static_cast<std::uint8_t>(value >> 8));
 }
 
-Jaw::Jaw(int closed_count, int open_count, double jaw_mm) : closed_(closed_count), open_(open_count), jaw_mm_(jaw_mm) {}
-
-Jaw::Jaw(const GripperWay &complete) : Jaw(*complete.closed_count, *complete.open_count, complete.jaw_mm) {}
-
 double Jaw::step_mm() const { return jaw_mm_ * COUNT_rad; }
 
 double Jaw::width_mm(double count) const {
@@ -109,17 +93,14 @@ double Jaw::slope_mm(double width_mm) const {
   return step_mm() * std::sqrt(1 - sine * sine);
 }
 
-GripperTraits feetech_traits(const std::string &model, const Jaw &jaw, double jaw_mm) {
-  return {.model = model,
-          .stroke_mm = jaw.stroke_mm(),
-          .step_mm = jaw.step_mm(),
-          .speed_min_mm_s = 1.0,
-          .speed_max_mm_s = FULL_SPEED_rad_s * jaw_mm,
-          .force_min_N = LEAST_TORQUE * STALL_Nm * 1000 / jaw_mm,
-          .force_max_N = STALL_Nm * 1000 / jaw_mm,
-          .latency_s = 0.008,
-          .poll_s = 0.001,
-          .driver = GripperDriver::feetech};
+GripperTraits feetech_traits(const std::string &model, const GripperWay &complete) {
+  const Jaw jaw(complete);
+  constexpr double LEAST_mm_s = 1.0, LATENCY_s = 0.008, POLL_s = 0.001;
+  const double most_N = STALL_Nm * 1000 / complete.jaw_mm;
+  return {{jaw.stroke_mm(), jaw.step_mm(), 0.0, LEAST_mm_s, FULL_SPEED_rad_s * complete.jaw_mm,
+           LEAST_TORQUE * STALL_Nm * 1000 / complete.jaw_mm, most_N, LATENCY_s, POLL_s},
+          model,
+          GripperDriver::feetech};
 }
 
 GripperWay feetech_way(const GripperWay &way) {
@@ -131,7 +112,7 @@ GripperWay feetech_way(const GripperWay &way) {
 }
 
 FeetechGripper::FeetechGripper(const GripperWay &given)
-    : AskedLine(feetech_way(given), BAUD), jaw_(way_), traits_(feetech_traits(way_.model, jaw_, way_.jaw_mm)) {
+    : AskedLine(feetech_way(given), BAUD, feetech_traits(given.model, feetech_way(given))), jaw_(way_) {
   const Bytes table = read(MODEL, OPERATING_MODE + 1 - MODEL);
   servo_model_ = word(table, 0);
   const int mode = table[OPERATING_MODE - MODEL];
@@ -159,8 +140,6 @@ std::pair<AskedLine::Bytes, std::size_t> FeetechGripper::sure_question(int numbe
 Bytes FeetechGripper::question_of(std::uint8_t instruction, const Bytes &parameters) const {
   return encoded({static_cast<std::uint8_t>(way_.slave), instruction, parameters});
 }
-
-Bytes FeetechGripper::read(std::uint8_t address, std::uint8_t length) { return exchange(question_of(READ, {address, length}), length); }
 
 void FeetechGripper::write(std::uint8_t address, const Bytes &values) {
   Bytes parameters = {address};
@@ -217,11 +196,8 @@ void FeetechGripper::activate() {
 
 GripperStatus FeetechGripper::move(const GripperMove &move) {
   check_move(move);
-  if (!active_) {
-    poll();
-    if (!active_) {
-      return poll();
-    }
+  if (!active_ && !poll().active) {
+    return poll();
   }
   const double width_mm = std::clamp(move.width_mm, 0.0, traits_.stroke_mm);
   const double speed_mm_s = std::clamp(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s);
@@ -233,7 +209,7 @@ GripperStatus FeetechGripper::move(const GripperMove &move) {
 
 std::string FeetechGripper::line() const {
   return "Feetech bus at " + std::to_string(BAUD) + " baud, slave " + std::to_string(way_.slave) + ", servo model " +
-         std::to_string(servo_model_) + limited_by(way_.port, 2);
+         std::to_string(servo_model_) + limited_by(2);
 }
 
 std::string FeetechGripper::fault_text(std::uint8_t fault) const {

@@ -6,18 +6,70 @@
 //
 // Its force limit is a share of the stall torque, 1.9 Nm at 7.4 V by the maker's figures, over the
 // jaw. This is only a guess of the force in newtons: friction in the gears is at least as large.
+//
+// Sources of the servo's memory and packets: Feetech, "STS Magnetic Encoding Smart Servo Protocol Manual", and "SMS/STS memory table".
+// Half-duplex serial. A packet is FF FF, id, length (of the rest), instruction or error bits, parameters, checksum (~ of the
+// sum from id on). Values of two bytes have the low byte first. Negative ones have a sign bit.
 #pragma once
 
 #include "grasp/gripper/common.hpp"
-#include "grasp/gripper/feetech_table.hpp"
+
+namespace fingertip::feetech {
+
+constexpr int BAUD = 1'000'000;
+constexpr int SLAVE = 6, MOST_SLAVE = 253; // the gripper of an SO-101
+constexpr std::uint8_t BROADCAST = 254;
+constexpr double COUNTS_PER_TURN = 4096.0;
+
+// REG_WRITE is done on ACTION.
+enum Instruction : std::uint8_t { PING = 1, READ = 2, WRITE = 3, REG_WRITE = 4, ACTION = 5, SYNC_READ = 0x82, SYNC_WRITE = 0x83 };
+
+enum Address : std::uint8_t {
+  MODEL = 3, // 2 bytes
+  ID = 5,
+  LEAST_ANGLE = 9,     // 2 bytes
+  MOST_ANGLE = 11,     // 2 bytes
+  MOST_TORQUE = 16,    // 2 bytes, 0.1 %
+  OPERATING_MODE = 33, // 0: position
+  TORQUE_ENABLE = 40,
+  ACCELERATION = 41,
+  GOAL_POSITION = 42,    // 2 bytes
+  GOAL_SPEED = 46,       // 2 bytes, counts a second
+  TORQUE_LIMIT = 48,     // 2 bytes, 0.1 % of the stall torque
+  PRESENT_POSITION = 56, // 2 bytes
+  STATUS = 65,           // enum Trouble
+  MOVING = 66,
+  PRESENT_CURRENT = 69, // 2 bytes, 6.5 mA
+  TABLE_END = 71,
+};
+
+enum Trouble : std::uint8_t { VOLTAGE = 1, SENSOR = 2, TEMPERATURE = 4, CURRENT = 8, ANGLE = 16, OVERLOAD = 32 };
+
+constexpr double AMPERE_PER_COUNT = 0.0065;
+constexpr int SIGN = 1 << 15;
+constexpr int STS3215 = 777; // MODEL
+
+using Bytes = std::vector<std::uint8_t>;
+
+struct Packet {
+  std::uint8_t id = 0;
+  std::uint8_t code = 0; // an instruction, or of an answer bits of enum Trouble
+  Bytes parameters = {};
+};
+
+Bytes encoded(const Packet &packet);
+
+// The first whole packet, taken out of the bytes together with what was before it. skipped counts
+// bytes that belong to none: noise, or a packet whose checksum is wrong.
+std::optional<Packet> take_packet(Bytes *bytes, std::size_t *skipped);
+
+} // namespace fingertip::feetech
 
 namespace fingertip {
 
 class Jaw {
 public:
-  Jaw(int closed_count, int open_count, double jaw_mm);
-  // The jaw of this way, or the usual one.
-  explicit Jaw(const GripperWay &complete);
+  explicit Jaw(const GripperWay &complete) : closed_(*complete.closed_count), open_(*complete.open_count), jaw_mm_(complete.jaw_mm) {}
 
   double stroke_mm() const { return width_mm(open_); }
   double step_mm() const; // of one count, closed, where it is the largest
@@ -33,16 +85,15 @@ private:
   double jaw_mm_;
 };
 
-// The usual jaw's, and what the servo can do on it.
-GripperTraits feetech_traits(const std::string &model, const Jaw &jaw, double jaw_mm);
-// GripperWay, completed by the defaults. Throws Error: bad_value.
+// What the servo can do on the jaw of this way.
+GripperTraits feetech_traits(const std::string &model, const GripperWay &complete);
+// Completed by the defaults. Throws Error: bad_value.
 GripperWay feetech_way(const GripperWay &way);
 
-class FeetechGripper final : public Gripper, AskedLine {
+class FeetechGripper final : public AskedLine {
 public:
   explicit FeetechGripper(const GripperWay &given);
 
-  const GripperTraits &traits() const override { return traits_; }
   std::string line() const override;
   // Torque on, at the position where it is.
   void activate() override;
@@ -55,14 +106,12 @@ private:
   Heard take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) override;
   std::pair<Bytes, std::size_t> sure_question(int number) const override;
   Bytes question_of(std::uint8_t instruction, const Bytes &parameters) const;
-  Bytes read(std::uint8_t address, std::uint8_t length);
+  Bytes read(std::uint8_t address, std::uint8_t length) { return exchange(question_of(feetech::READ, {address, length}), length); }
   void write(std::uint8_t address, const Bytes &values);
   void command(double count, int speed, int torque);
 
   Jaw jaw_;
-  GripperTraits traits_;
   int servo_model_ = 0;
-  bool active_ = false; // by the last status
   std::int64_t commanded_us_ = 0;
   double goal_count_ = -1;
 };

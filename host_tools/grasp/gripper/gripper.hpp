@@ -16,6 +16,7 @@
 //   gone              the port vanished; only open_gripper brings it back
 #pragma once
 
+#include "grasp/fingertip_grip.h"
 #include "libfingertip/error.hpp"
 
 #include <cstdint>
@@ -29,15 +30,8 @@ namespace fingertip {
 /* The driver of a gripper, and so its kind: a screw drive behind Modbus registers, or a servo that turns a jaw. */
 enum class GripperDriver { robotiq, feetech };
 
-struct GripperTraits {
-  std::string model;                                 // "2f85"
-  double stroke_mm = 0.0;                            // width between the pads when open
-  double step_mm = 0.0;                              // of the commanded width; of a servo's jaw the largest
-  double deadband_mm = 0.0;                          // moves shorter than this are not made
-  double speed_min_mm_s = 0.0, speed_max_mm_s = 0.0; // of the width
-  double force_min_N = 0.0, force_max_N = 0.0;       // of its own limit of force; 0: it has none
-  double latency_s = 0.0;                            // from a command to motion
-  double poll_s = 0.0;                               // of one exchange, at the least
+struct GripperTraits : fingertip_grip_traits {
+  std::string model; // "2f85"
   GripperDriver driver = GripperDriver::robotiq;
 };
 
@@ -51,6 +45,7 @@ struct GripperStatus {
   std::uint8_t fault = 0; // the maker's code; 0: none
   // The gripper got no question for a second or more before this exchange. No fault: a gripper that reports this goes on.
   bool was_left_alone = false;
+  double t_s() const { return 1e-6 * static_cast<double>(host_us); }
 };
 
 struct GripperMove {

@@ -19,16 +19,8 @@ struct Range {
 };
 
 Model robotiq_traits(const char *model, double stroke_mm, double deadband_mm, Range speed_mm_s, Range force_N) {
-  return {{.model = model,
-           .stroke_mm = stroke_mm,
-           .step_mm = stroke_mm / 227,
-           .deadband_mm = deadband_mm,
-           .speed_min_mm_s = speed_mm_s.low,
-           .speed_max_mm_s = speed_mm_s.high,
-           .force_min_N = force_N.low,
-           .force_max_N = force_N.high,
-           .latency_s = 0.025,
-           .poll_s = 0.005},
+  constexpr double LATENCY_s = 0.025, POLL_s = 0.005;
+  return {{{stroke_mm, stroke_mm / 227, deadband_mm, speed_mm_s.low, speed_mm_s.high, force_N.low, force_N.high, LATENCY_s, POLL_s}, model},
           driven_by<RobotiqGripper>};
 }
 
@@ -41,7 +33,7 @@ const std::vector<Model> &models() {
       robotiq_traits("2f85", 85.0, 0.4, {20.0, 150.0}, {20.0, 235.0}),
       robotiq_traits("2f140", 140.0, 0.65, {30.0, 250.0}, {10.0, 125.0}),
       robotiq_traits("hande", 50.0, 0.23, {20.0, 150.0}, {20.0, 185.0}),
-      {feetech_traits("sts3215", Jaw(feetech_way({})), GripperWay().jaw_mm), driven_by<FeetechGripper>},
+      {feetech_traits("sts3215", feetech_way({})), driven_by<FeetechGripper>},
   };
   return all;
 }

@@ -1,6 +1,5 @@
 #include "grasp/gripper/robotiq.hpp"
 
-#include "grasp/gripper/robotiq_registers.hpp"
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
@@ -43,33 +42,20 @@ constexpr std::size_t HEAD = 2, CRC = 2; // slave and function
 constexpr GripperUsual USUAL = {
     .slave = SLAVE, .most_slave = 247, .closed_count = CLOSED_COUNT, .open_count = OPEN_COUNT, .most_count = 255};
 
-static void put_word(Bytes *to, int value) {
-  to->push_back(static_cast<std::uint8_t>(value >> 8));
-  to->push_back(static_cast<std::uint8_t>(value & 0xFF));
-}
-
-static void put_range(Bytes *to, int address, int count) {
-  put_word(to, address);
-  put_word(to, count);
-}
-
-static void put_values(Bytes *to, int count, const std::uint16_t *values) {
-  to->push_back(static_cast<std::uint8_t>(2 * count));
-  for (int i = 0; i < count; i++) {
-    put_word(to, values[i]);
+static void put_words(Bytes *to, std::initializer_list<int> words) {
+  for (const int word : words) {
+    to->insert(to->end(), {static_cast<std::uint8_t>(word >> 8), static_cast<std::uint8_t>(word & 0xFF)});
   }
+}
+
+// How many bytes, and those of the registers from this one on.
+static void put_values(Bytes *to, const std::array<std::uint16_t, REGISTERS> &values, int from) {
+  to->push_back(static_cast<std::uint8_t>(2 * (REGISTERS - from)));
+  std::for_each(values.begin() + from, values.end(), [&](int value) { put_words(to, {value}); });
 }
 
 // Length of the answer to a read: the count of bytes, and the registers.
 static std::size_t answer_length(int count) { return 1 + 2 * static_cast<std::size_t>(count); }
-
-static std::array<std::uint16_t, 3> registers_of(const Bytes &answer, int count) {
-  std::array<std::uint16_t, 3> registers{};
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count); i++) {
-    registers[i] = static_cast<std::uint16_t>(answer[1 + 2 * i] << 8 | answer[2 + 2 * i]);
-  }
-  return registers;
-}
 
 static std::uint16_t share(double value, double least, double most) {
   const double clamped = std::clamp(value, least, most);
@@ -84,13 +70,13 @@ static GripperWay robotiq_way(const GripperWay &given) {
   return way;
 }
 
-RobotiqGripper::RobotiqGripper(const GripperWay &given) : AskedLine(robotiq_way(given), BAUD), traits_(gripper_traits(given.model)) {
+RobotiqGripper::RobotiqGripper(const GripperWay &given) : AskedLine(robotiq_way(given), BAUD, gripper_traits(given.model)) {
   traits_.step_mm = traits_.stroke_mm / (*way_.closed_count - *way_.open_count);
   std::optional<Error> garbled;
   for (const int function : {4, 3}) {
     read_function_ = function;
     try {
-      read_status();
+      poll();
       return;
     } catch (const Error &error) {
       if (error.code() == ErrorCode::gripper_garbled && !garbled) {
@@ -139,23 +125,26 @@ std::pair<AskedLine::Bytes, std::size_t> RobotiqGripper::sure_question(int numbe
   return {read_question(number), answer_length(number)};
 }
 
-AskedLine::Bytes RobotiqGripper::question_of(std::uint8_t function, const Bytes &rest) const {
-  Bytes question = {static_cast<std::uint8_t>(way_.slave), function};
+AskedLine::Bytes RobotiqGripper::question_of(int function, const Bytes &rest) const {
+  Bytes question = {static_cast<std::uint8_t>(way_.slave), static_cast<std::uint8_t>(function)};
   question.insert(question.end(), rest.begin(), rest.end());
   return with_crc(question);
 }
 
 AskedLine::Bytes RobotiqGripper::read_question(int count) const {
   Bytes rest;
-  put_range(&rest, STATUS_REGISTER, count);
-  return question_of(static_cast<std::uint8_t>(read_function_), rest);
+  put_words(&rest, {STATUS_REGISTER, count});
+  return question_of(read_function_, rest);
 }
 
-RobotiqGripper::Registers RobotiqGripper::read(int count) {
-  return registers_of(exchange(read_question(count), answer_length(count)), count);
+RobotiqGripper::Registers RobotiqGripper::registers_of(const Bytes &question, int count) {
+  const Bytes answer = exchange(question, answer_length(count));
+  Registers registers{};
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); i++) {
+    registers[i] = static_cast<std::uint16_t>(answer[1 + 2 * i] << 8 | answer[2 + 2 * i]);
+  }
+  return registers;
 }
-
-GripperStatus RobotiqGripper::read_status() { return status_of(read(REGISTERS)); }
 
 GripperStatus RobotiqGripper::status_of(const Registers &registers) {
   const int gsta = registers[0] >> gSTA_SHIFT & 3, gobj = registers[0] >> gOBJ_SHIFT & 3;
@@ -180,11 +169,11 @@ GripperStatus RobotiqGripper::status_of(const Registers &registers) {
   return status;
 }
 
-void RobotiqGripper::write(int address, int count, const std::uint16_t *values) {
+void RobotiqGripper::write(const Registers &command, int from) {
   Bytes rest;
-  put_range(&rest, address, count);
+  put_words(&rest, {COMMAND_REGISTER + from, REGISTERS - from});
   const Bytes range = rest;
-  put_values(&rest, count, values);
+  put_values(&rest, command, from);
   if (exchange(question_of(WRITE, rest), range.size()) != range) {
     doubt();
     throw Error(ErrorCode::gripper_garbled, way_.port + ": an answer is not one to the question");
@@ -192,22 +181,19 @@ void RobotiqGripper::write(int address, int count, const std::uint16_t *values) 
 }
 
 void RobotiqGripper::activate() {
-  const Registers reset = {0, 0, 0}, set = {rACT, 0, 0};
-  write(COMMAND_REGISTER, REGISTERS, reset.data());
+  write({});
   // Only a rise of rACT activates: it must have seen the reset.
   std::uint16_t status = gACT;
   for (int i = 0; i < RESET_READS && (status & gACT); i++) {
     wait_until(host_now() + PAUSE);
-    status = read(1)[0];
+    status = registers_of(read_question(1), 1)[0];
   }
   if (status & gACT) {
-    throw Error(ErrorCode::gripper_refused, line_.path() + ": does not reset");
+    throw Error(ErrorCode::gripper_refused, way_.port + ": does not reset");
   }
-  write(COMMAND_REGISTER, REGISTERS, set.data());
+  write({rACT});
   goes_ = active_ = false;
 }
-
-GripperStatus RobotiqGripper::poll() { return read_status(); }
 
 GripperStatus RobotiqGripper::move(const GripperMove &move) {
   check_move(move);
@@ -220,22 +206,21 @@ GripperStatus RobotiqGripper::move(const GripperMove &move) {
                              static_cast<std::uint16_t>(share(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s) << 8 |
                                                         share(move.force_N, traits_.force_min_N, traits_.force_max_N))};
   if (!goes_) {
-    const GripperStatus now = read_status();
+    const GripperStatus now = poll();
     if (!active_) {
       return now;
     }
     if (!goes_) {
-      write(COMMAND_REGISTER, REGISTERS, command.data());
-      return read_status();
+      write(command);
+      return poll();
     }
   }
   if (both_at_once_) {
     try {
       Bytes rest;
-      put_range(&rest, STATUS_REGISTER, REGISTERS);
-      put_range(&rest, COMMAND_REGISTER + 1, REGISTERS - 1);
-      put_values(&rest, REGISTERS - 1, command.data() + 1);
-      const Registers registers = registers_of(exchange(question_of(WRITE_AND_READ, rest), answer_length(REGISTERS)), REGISTERS);
+      put_words(&rest, {STATUS_REGISTER, REGISTERS, COMMAND_REGISTER + 1, REGISTERS - 1});
+      put_values(&rest, command, 1);
+      const Registers registers = registers_of(question_of(WRITE_AND_READ, rest), REGISTERS);
       both_worked_ = true;
       return status_of(registers);
     } catch (const Error &error) {
@@ -248,29 +233,27 @@ GripperStatus RobotiqGripper::move(const GripperMove &move) {
     make_sure(); // it is there, but does not answer this
     both_at_once_ = both_failed_ < BOTH_TRIES;
   }
-  write(COMMAND_REGISTER + 1, REGISTERS - 1, command.data() + 1);
-  return read_status();
+  write(command, 1);
+  return poll();
 }
 
 std::string RobotiqGripper::line() const {
-  std::string text = "Modbus RTU at " + std::to_string(BAUD) + " baud, slave " + std::to_string(way_.slave) + ", function " +
-                     (both_at_once_ ? "23" : "16 and " + std::to_string(read_function_));
-  return text + limited_by(line_.path(), both_at_once_ ? 1 : 2);
+  return "Modbus RTU at " + std::to_string(BAUD) + " baud, slave " + std::to_string(way_.slave) + ", function " +
+         (both_at_once_ ? "23" : "16 and " + std::to_string(read_function_)) + limited_by(both_at_once_ ? 1 : 2);
 }
 
 std::string RobotiqGripper::fault_text(std::uint8_t fault) const {
-  static const std::pair<Fault, const char *> TEXTS[] = {
-      {NO_FAULT, ""},
-      {ACTION_DELAYED, "a move came before activation was complete"},
-      {NOT_ACTIVATED, "a move came without activation"},
-      {OVERHEATED, "too hot, it must cool down"},
-      {NO_COMMUNICATION, "no command for a second"},
-      {UNDERVOLTAGE, "its supply is too low; needs activation"},
-      {RELEASING, "automatic release goes on"},
-      {INTERNAL_FAULT, "internal fault; needs activation"},
-      {ACTIVATION_FAULT, "activation failed, something was in its way; needs activation"},
-      {OVERCURRENT, "too much current; needs activation"},
-      {RELEASED, "automatic release is complete; needs activation"}};
+  static const std::pair<std::uint8_t, const char *> TEXTS[] = {{NO_FAULT, ""},
+                                                                {ACTION_DELAYED, "a move came before activation was complete"},
+                                                                {NOT_ACTIVATED, "a move came without activation"},
+                                                                {8, "too hot, it must cool down"},
+                                                                {NO_COMMUNICATION, "no command for a second"},
+                                                                {10, "its supply is too low; needs activation"},
+                                                                {11, "automatic release goes on"},
+                                                                {12, "internal fault; needs activation"},
+                                                                {13, "activation failed, something was in its way; needs activation"},
+                                                                {OVERCURRENT, "too much current; needs activation"},
+                                                                {15, "automatic release is complete; needs activation"}};
   const auto *found = find_in(TEXTS, [&](const auto &one) { return one.first == fault; });
   return found ? found->second : "a fault that its manual does not have";
 }

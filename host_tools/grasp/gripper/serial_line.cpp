@@ -28,28 +28,22 @@ static std::string line_of(const fs::path &path) {
   return std::string(trim(text));
 }
 
-SerialLine::SerialLine(const std::string &path, unsigned baud) : path_(path), transport_(path) {
-  const int fd = descriptor();
+SerialLine::SerialLine(const std::string &path, unsigned baud) : SerialTransport(path) {
   termios settings;
   struct stat status;
-  const bool is_simulated = fstat(fd, &status) == 0 && S_ISSOCK(status.st_mode);
+  const bool is_simulated = fstat(fd_, &status) == 0 && S_ISSOCK(status.st_mode);
   if (is_simulated) {
     speed_of(baud); // which a socket does not have
-  } else if (tcgetattr(fd, &settings) != 0 || cfsetspeed(&settings, speed_of(baud)) != 0 || tcsetattr(fd, TCSANOW, &settings) != 0) {
+  } else if (tcgetattr(fd_, &settings) != 0 || cfsetspeed(&settings, speed_of(baud)) != 0 || tcsetattr(fd_, TCSANOW, &settings) != 0) {
     throw Error(ErrorCode::cannot_open, path + ": cannot go at " + std::to_string(baud) + " baud");
   }
   drop_input();
 }
 
-int SerialLine::descriptor() const {
-  const std::vector<pollfd> descriptors = transport_.poll_descriptors();
-  return descriptors.empty() ? -1 : descriptors.front().fd;
-}
-
 void SerialLine::drop_input() {
   std::uint8_t bytes[256];
-  if (tcflush(descriptor(), TCIFLUSH) != 0) {
-    while (recv(descriptor(), bytes, sizeof bytes, MSG_DONTWAIT) > 0) { // of a simulated port
+  if (tcflush(fd_, TCIFLUSH) != 0) {
+    while (recv(fd_, bytes, sizeof bytes, MSG_DONTWAIT) > 0) { // of a simulated port
     }
   }
 }
@@ -57,12 +51,8 @@ void SerialLine::drop_input() {
 std::optional<int> latency_timer_ms(const std::string &port, const std::string &root) {
   std::error_code none;
   const fs::path device = fs::canonical(port, none);
-  const std::optional<std::int64_t> milliseconds =
-      to_i64(line_of(fs::path(root) / "sys/bus/usb-serial/devices" / device.filename() / "latency_timer"));
-  if (none || !milliseconds) {
-    return {};
-  }
-  return static_cast<int>(*milliseconds);
+  const auto timer_ms = to_i64(line_of(fs::path(root) / "sys/bus/usb-serial/devices" / device.filename() / "latency_timer"));
+  return none || !timer_ms ? std::nullopt : std::optional(static_cast<int>(*timer_ms));
 }
 
 std::vector<GripperPort> find_gripper_ports(const std::string &root) {

@@ -9,21 +9,13 @@
 
 namespace fingertip {
 
-class SerialLine {
+class SerialLine : public SerialTransport {
 public:
   // 8N1, held exclusively. Throws Error: the port is absent, in use, not allowed, no serial port, or does not go that fast.
   SerialLine(const std::string &path, unsigned baud);
 
-  SerialTransport &transport() { return transport_; }
-  const std::string &path() const { return path_; }
-  // -1 once the port vanished.
-  int descriptor() const;
   // Forgets what came and was not read.
   void drop_input();
-
-private:
-  std::string path_;
-  SerialTransport transport_;
 };
 
 // Milliseconds that a USB adapter holds back an answer that does not fill a packet; empty where its

@@ -111,12 +111,8 @@ KindTrial trial_of(const Thing &thing, const std::string &gripper, const When &w
   grasp.lift_s = 0.3;
   grasp.ends_s = 60.0;
   trial.activates = when.state == GRIP_ACTIVATING;
-  if (trial.activates) {
-    grasp.width_mm = trial.gripper.traits.stroke_mm - grasp.opens_mm;
-  }
-  if (when.state == GRIP_SLIPPING) {
-    trial.slick_after_s = 0.6;
-  }
+  grasp.width_mm = trial.activates ? trial.gripper.traits.stroke_mm - grasp.opens_mm : grasp.width_mm;
+  trial.slick_after_s = when.state == GRIP_SLIPPING ? std::optional(0.6) : std::nullopt;
   trial.asked = when.asked;
   trial.asked_after_s = 0.8;
   Fault fault;
@@ -134,37 +130,30 @@ KindTrial trial_of(const Thing &thing, const std::string &gripper, const When &w
 
 // What must be reported, where that depends on the state.
 void expect(FaultTrial &one) {
-  const When &when = one.when;
-  const Happening &happening = one.happening;
-  one.all_of = happening.all_of;
-  const bool untouched = when.state == GRIP_ACTIVATING || when.state == GRIP_APPROACH;
-  if (happening.kind == FaultKind::frozen && untouched) {
-    one.is_untold = happening.fingers == BOTH;
+  const std::uint8_t state = one.when.state;
+  const FaultKind kind = one.happening.kind;
+  const bool untouched = state == GRIP_ACTIVATING || state == GRIP_APPROACH, squeezes = state == GRIP_SQUEEZE;
+  one.all_of = one.happening.all_of;
+  if (kind == FaultKind::frozen && untouched) {
+    one.is_untold = one.happening.fingers == BOTH;
     one.all_of = 0;
     one.any_of = one.is_untold ? 0 : GRIP_FINGER_0_FROZEN | GRIP_FINGERS_DIFFER;
-  }
-  if (happening.kind == FaultKind::nothing && (untouched || when.state == GRIP_RELEASE)) {
+  } else if (kind == FaultKind::nothing && (untouched || state == GRIP_RELEASE)) {
     one.all_of = untouched ? std::uint32_t{GRIP_FINGERS_DIFFER} : 0u;
-  } else if (happening.kind == FaultKind::nothing && when.state == GRIP_SQUEEZE) {
+  } else if (kind == FaultKind::nothing && squeezes) {
     one.all_of = 0; // it may have touched with too little force to be missed
     one.any_of = GRIP_FINGER_0_EMPTY | GRIP_FINGERS_DIFFER;
-  }
-  if (happening.kind == FaultKind::fault || happening.kind == FaultKind::power) {
-    one.ends_in = {GRIP_FAULT};
-  } else if (happening.kind == FaultKind::taken && (when.state == GRIP_RELEASE || when.state == GRIP_HANDING)) {
+  } else if (kind == FaultKind::fault || (kind == FaultKind::power && state != GRIP_ACTIVATING)) {
+    one.ends_in = {GRIP_FAULT}; // without power while it is activated it reports that it is not active, and waits for it
+  } else if (kind == FaultKind::taken && (state == GRIP_RELEASE || state == GRIP_HANDING)) {
     one.ends_in = {GRIP_RELEASE, GRIP_OPEN}; // as it was asked to
-  } else if (happening.kind == FaultKind::taken) {
+  } else if (kind == FaultKind::taken && squeezes) {
+    one.ends_in = {GRIP_DROPPED, GRIP_MISSED}; // so soon after the touch that the approach may go on
+  } else if (kind == FaultKind::taken) {
     one.ends_in = {untouched ? std::uint8_t{GRIP_MISSED} : std::uint8_t{GRIP_DROPPED}};
-    if (when.state == GRIP_SQUEEZE) { // so soon after the touch that the approach may go on
-      one.ends_in.push_back(GRIP_MISSED);
-      one.trial.fault->watched_s = 17.0;
-    }
-  }
-  if (when.state == GRIP_ACTIVATING && happening.kind == FaultKind::power) {
-    one.ends_in.clear(); // it reports that it is not active when it should be, and waits for it
   }
   // As long as it takes to close, or to give up.
-  if (untouched && (happening.kind == FaultKind::taken || happening.kind == FaultKind::power)) {
+  if ((untouched && kind == FaultKind::power) || ((untouched || squeezes) && kind == FaultKind::taken)) {
     one.trial.fault->watched_s = 17.0;
   }
 }

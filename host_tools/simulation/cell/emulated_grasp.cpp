@@ -40,7 +40,6 @@ using Bytes = std::vector<std::uint8_t>;
 enum Stream : std::uint64_t { LINE = 841, PAD = 842 };
 
 constexpr const char *FACE = "sphere15";
-constexpr double LAYER_mm = 12.0;
 constexpr double FRICTION = 0.65;  // static, before it falls
 constexpr double SLICE_s = 500e-6; // lockstep.mjs, by default
 constexpr std::uint64_t SEED = 1;  // of pads and of the gripper's line
@@ -139,15 +138,9 @@ private:
   ClockFit clock_;
 };
 
-struct EmulatedTrial {
-  KindOfGrasp grasp;
-  GripperMechanics gripper;
-};
-
 // Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
-EmulatedTrial trial_of(double friction_falls) {
-  EmulatedTrial trial;
-  KindOfGrasp &grasp = trial.grasp;
+KindOfGrasp grasp_of(double friction_falls) {
+  KindOfGrasp grasp;
   grasp.pads[0].friction = 1.03 * FRICTION;
   grasp.pads[1].friction = 0.97 * FRICTION;
   grasp.com_mm = {3.0, 1.0};
@@ -159,23 +152,22 @@ EmulatedTrial trial_of(double friction_falls) {
   grasp.lift_s = 0.5;
   grasp.events = {{Event::Kind::slick, grasp.lift_s + 0.1, 0.03, friction_falls}};
   grasp.ends_s = grasp.lift_s + 0.4;
-  trial.gripper = gripper_mechanics(gripper_models().front().model);
-  return trial;
+  return grasp;
 }
 
 // To a microsecond.
 ordered_json to_us(double s, double per_unit = 1e6) {
   return std::isfinite(s) ? ordered_json(std::round(1e6 * s) / per_unit) : ordered_json(nullptr);
 }
-ordered_json in_ms(double s) { return to_us(s, 1e3); }
 
 class EmulatedGrasp {
 public:
   // All must outlive it.
-  EmulatedGrasp(const EmulatedTrial &trial, const Face &face, const pad_profile &profile)
-      : trial_(trial), face_(face), cell_(trial.grasp),
-        gripper_(trial.gripper, trial.grasp.width_mm + trial.grasp.opens_mm, Random(SEED, LINE, 0)),
-        fingers_{EmulatedFingertip(profile, Random(SEED, PAD, 0)), EmulatedFingertip(profile, Random(SEED, PAD, 1))} {
+  EmulatedGrasp(const KindOfGrasp &grasp, const GripperMechanics &gripper, const Face &face, const pad_profile &profile)
+      : grasp_(grasp), face_(face), cell_(grasp),
+        gripper_(gripper, grasp.width_mm + grasp.opens_mm, Random(SEED, LINE, 0)), fingers_{
+                                                                                       EmulatedFingertip(profile, Random(SEED, PAD, 0)),
+                                                                                       EmulatedFingertip(profile, Random(SEED, PAD, 1))} {
     gripper_.motion().blocked_at = [this](double width_mm, double force_N) {
       return force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
     };
@@ -198,17 +190,14 @@ public:
   // To the end of the next slice.
   void run(double until_s) {
     if (!controller_ && fingers_[0].is_ready() && fingers_[1].is_ready()) {
-      const GripperTraits &traits = trial_.gripper.traits;
+      const GripperTraits &traits = gripper_.motion().mechanics().traits;
       controller_ = std::make_unique<CoreController>(default_settings(traits), traits);
       asked_s_ = t_s_;
     }
     while (t_s_ < until_s && !over_) {
-      double next_s = std::min({until_s, gripper_.next_s(), t_s_ + MOVES_s});
-      if (!line_.empty()) {
-        next_s = std::min(next_s, line_.front().known_s);
-      }
-      advance(next_s);
-      if (!line_.empty() && line_.front().known_s <= t_s_) {
+      const double known_s = line_.empty() ? NEVER_s : line_.front().known_s;
+      advance(std::min({until_s, gripper_.next_s(), t_s_ + MOVES_s, known_s}));
+      if (known_s <= t_s_) {
         if (controller_) {
           controller_->take_status(line_.front().status);
           step_controller();
@@ -230,22 +219,12 @@ public:
   Pressures sensed_Pa(std::size_t finger) const { return fingers_[finger].sensed_Pa(face_.base_Pa(cell_.patch(finger))); }
   bool over() const { return over_; }
 
-  // What happened, and when, of the first slip after the lift:
-  //   begin_s  emulated time
-  //   by ms after it: measured_ms the first frame that reported it, sent_ms the packet that left its
-  //   chip whole, answered_ms the controller's command, asked_ms on the gripper's line, moved_ms
-  //   the fingers, reaction_ms 5 % more force; null: never
+  // What happened, and when, of the first slip after the lift, as report/grasp/emulated_grasp.py names it; null: never.
   // reported_by: "SLIDING", or "load" if a fingertip's load rose by a tenth and 0.1 N.
   ordered_json summary() const {
-    ordered_json out;
-    out["dropped"] = dropped_;
-    out["slid_mm"] = cell_.slid_mm();
-    out["asked_s"] = to_us(asked_s_);
-    out["holding_s"] = to_us(holds_s_);
-    out["lift_s"] = to_us(lift_s_);
-    out["end_s"] = to_us(t_s_);
-    out["trouble"] = trouble_;
-    out["slips"] = slips_.slips.size();
+    ordered_json out = {{"dropped", dropped_},          {"slid_mm", cell_.slid_mm()},  {"asked_s", to_us(asked_s_)},
+                        {"holding_s", to_us(holds_s_)}, {"lift_s", to_us(lift_s_)},    {"end_s", to_us(t_s_)},
+                        {"trouble", trouble_},          {"slips", slips_.slips.size()}};
     out["slip"] = slips_.slips.empty() ? ordered_json(nullptr) : answer_to(slips_.slips.front());
     for (std::size_t f = 0; f < fingers_.size(); f++) {
       ordered_json one = {{"frames", frames_[f]}, {"loads", loads_[f]}}; // loads: frames that report one
@@ -283,13 +262,13 @@ private:
     if (seconds <= 0.0) {
       return;
     }
-    if (lift_s_ == NEVER_s && t_s_ >= holds_s_ + trial_.grasp.waits_s) {
+    if (lift_s_ == NEVER_s && t_s_ >= holds_s_ + grasp_.waits_s) {
       lift_s_ = t_s_;
     }
     const bool lifts = lift_s_ < NEVER_s;
     const double width_mm = gripper_.motion().width_mm();
     gripper_.motion().step(seconds);
-    const KindOfGrasp::Inputs inputs = trial_.grasp.inputs(lifts ? t_s_ + 0.5 * seconds - lift_s_ : -1.0);
+    const KindOfGrasp::Inputs inputs = grasp_.inputs(lifts ? t_s_ + 0.5 * seconds - lift_s_ : -1.0);
     const double moved_mm = gripper_.motion().width_mm();
     cell_.run(seconds, moved_mm, inputs);
     t_s_ = to_s;
@@ -302,7 +281,7 @@ private:
     }
     const Vector way = cell_.way_mm();
     dropped_ = std::hypot(way.x, way.y) >= DROP_mm || (lifts && !inputs.table && force_N < LOST_N);
-    over_ = dropped_ || (lifts && t_s_ - lift_s_ >= trial_.grasp.ends_s);
+    over_ = dropped_ || (lifts && t_s_ - lift_s_ >= grasp_.ends_s);
     if (over_) {
       slips_.end();
     }
@@ -330,20 +309,21 @@ private:
       }
       return NEVER_s;
     };
-    ordered_json out;
-    out["begin_s"] = to_us(slip.begin_s);
-    out["way_mm"] = slip.way_mm;
-    out["reported_by"] = !first ? ordered_json(nullptr) : first->slides ? "SLIDING" : "load";
-    out["measured_ms"] = in_ms(first ? first->measured_s - slip.begin_s : NEVER_s);
-    out["sent_ms"] = in_ms(first ? first->arrived_s - slip.begin_s : NEVER_s);
-    out["answered_ms"] = in_ms(closed(commanded_));
-    out["asked_ms"] = in_ms(closed(asked_));
-    out["moved_ms"] = in_ms(closed(moved_));
-    out["reaction_ms"] = in_ms(slip.reaction_s.value_or(NEVER_s));
-    return out;
+    const auto in_ms = [](double s) { return to_us(s, 1e3); };
+    return {{"begin_s", to_us(slip.begin_s)},
+            {"way_mm", slip.way_mm},
+            {"reported_by", !first          ? ordered_json(nullptr)
+                            : first->slides ? "SLIDING"
+                                            : "load"},
+            {"measured_ms", in_ms(first ? first->measured_s - slip.begin_s : NEVER_s)},
+            {"sent_ms", in_ms(first ? first->arrived_s - slip.begin_s : NEVER_s)},
+            {"answered_ms", in_ms(closed(commanded_))},
+            {"asked_ms", in_ms(closed(asked_))},
+            {"moved_ms", in_ms(closed(moved_))},
+            {"reaction_ms", in_ms(slip.reaction_s.value_or(NEVER_s))}};
   }
 
-  const EmulatedTrial &trial_;
+  const KindOfGrasp &grasp_;
   const Face &face_;
   Cell cell_;
   GripperLine gripper_;
@@ -373,12 +353,8 @@ template <typename Value> Value next() {
   return value;
 }
 
-void put(const void *bytes, std::size_t length) {
-  if (std::fwrite(bytes, 1, length, stdout) != length) {
-    throw std::runtime_error("the boards do not listen");
-  }
-}
-
+// Whether all of it came through is known at the end.
+void put(const void *bytes, std::size_t length) { std::fwrite(bytes, 1, length, stdout); }
 void put_u32(std::size_t value) {
   const auto word = static_cast<std::uint32_t>(value);
   put(&word, sizeof word);
@@ -387,8 +363,9 @@ void put_u32(std::size_t value) {
 int serve(const std::string &cache, double friction_falls) {
   const Face face(FACE, LAYER_mm, cache);
   const pad_profile profile = pad::profile_over_own_sensors({LAYER_mm, 0.0, false});
-  const EmulatedTrial trial = trial_of(friction_falls);
-  EmulatedGrasp grasp(trial, face, profile);
+  const KindOfGrasp held = grasp_of(friction_falls);
+  const GripperMechanics gripper = gripper_mechanics(gripper_models().front().model);
+  EmulatedGrasp grasp(held, gripper, face, profile);
   Bytes bytes;
   while (!grasp.over()) {
     const double t_s = 1e-9 * static_cast<double>(next<std::uint64_t>());
@@ -414,16 +391,15 @@ int serve(const std::string &cache, double friction_falls) {
     }
     std::fflush(stdout);
   }
-  ordered_json out;
-  out["gripper"] = trial.gripper.traits.model;
-  out["face"] = FACE;
-  out["mass_kg"] = trial.grasp.mass_kg;
-  out["friction"] = FRICTION;
-  out["friction_falls"] = friction_falls;
+  ordered_json out = {{"gripper", gripper.traits.model},
+                      {"face", FACE},
+                      {"mass_kg", held.mass_kg},
+                      {"friction", FRICTION},
+                      {"friction_falls", friction_falls}};
   out.update(grasp.summary());
   const std::string text = out.dump();
   put(text.data(), text.size());
-  return std::fflush(stdout) == 0 ? 0 : 1;
+  return std::fflush(stdout) == 0 && std::ferror(stdout) == 0 ? 0 : 1;
 }
 
 } // namespace

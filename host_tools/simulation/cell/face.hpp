@@ -17,8 +17,8 @@
 namespace fingertip::cell {
 
 constexpr std::size_t SENSORS = 15;
-constexpr double AIR_Pa = 101325.0;
-using Pressures = std::array<double, SENSORS>; // Pa, on the base
+constexpr double AIR_Pa = 101325.0, LAYER_mm = 12.0; // of rubber
+using Pressures = std::array<double, SENSORS>;       // Pa, on the base
 
 // Its place is the centre of pressure, its angle that of its length.
 struct Patch : twin::Touch {

@@ -1,7 +1,6 @@
-// The memory of a simulated Feetech STS3215 (gripper/feetech_table.hpp) over its jaw's motion, and what it
+// The memory of a simulated Feetech STS3215 (gripper/feetech.hpp) over its jaw's motion, and what it
 // answers to the instructions of the maker's SDK.
 #include "grasp/gripper/feetech.hpp"
-#include "grasp/gripper/feetech_table.hpp"
 #include "simulation/cell/gripper_server.hpp"
 
 #include <algorithm>

@@ -36,7 +36,7 @@ constexpr std::chrono::milliseconds ROUND{1};
 class Fingertip {
 public:
   Fingertip(const FingerProcess &finger, SharedPressures &pressures)
-      : finger_(finger), pressures_(pressures), pad_(pad::profile_over_own_sensors({finger.layer_mm, 0.0, false})), port_(finger.link) {
+      : finger_(finger), pressures_(pressures), pad_(pad::profile_over_own_sensors({LAYER_mm, 0.0, false})), port_(finger.link) {
     power_up();
   }
 

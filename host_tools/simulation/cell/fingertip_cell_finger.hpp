@@ -50,7 +50,6 @@ private:
 struct FingerProcess {
   std::string serial, link; // of its port; what is in the link's way and no link is an error
   std::uint64_t seed = 1;
-  double layer_mm = 12.0;
   Pressures gain{};                    // of its sensors, as they are
   std::optional<double> calibrated_sd; // share by which its calibration is off; none: it has none
   bool parallel_bus = false;           // sim_array.h

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace fingertip::cell {
 namespace {
@@ -13,7 +12,6 @@ namespace {
 constexpr double STEP_s = 2.5e-4;                    // between two samples of the gripper
 constexpr double STEADY = 0.1, STEADY_LEAST_N = 0.2; // a force that changes by this share at most is steady
 constexpr double LOST_N = 0.01;
-constexpr double JOINED_s = 0.03; // what goes on after less rest is one slip
 
 struct Known {
   Event::Kind kind;
@@ -127,19 +125,10 @@ void World::watch_object() {
       events_.push_back(name_of(grasp_.events[i].kind));
     }
   }
-  const double slid_mm = cell_.slid_mm() - slid_before_mm_;
-  if (cell_.slips()) {
-    slipped_s_ = time_s_;
-    if (!slips_ && slid_mm >= SLIP_mm) {
-      slips_ = true;
-      events_.push_back("slip");
-    }
-  } else if (time_s_ - slipped_s_ > JOINED_s) {
-    if (slips_) {
-      slips_ = false;
-      events_.push_back("caught after " + fixed(slid_mm, 2) + " mm");
-    }
-    slid_before_mm_ = cell_.slid_mm();
+  const bool slipped = slips_.go_on();
+  slips_.sample(time_s_, cell_.slips(), cell_.mean_N(), cell_.slid_mm());
+  if (slips_.go_on() != slipped) {
+    events_.push_back(slipped ? "caught after " + fixed(slips_.slips.back().way_mm, 2) + " mm" : "slip");
   }
   const Vector way = cell_.way_mm();
   const bool in_the_air = lift_s_ && !grasp_.inputs(since_s).table;
@@ -149,8 +138,6 @@ void World::watch_object() {
     events_.push_back("dropped");
   }
 }
-
-Pressures World::pressures_Pa(std::size_t finger) const { return is_there_ ? face_.base_Pa(cell_.patch(finger)) : Pressures{}; }
 
 const char *World::columns() {
   return "world_s,width_mm,force_N,peak_N,load_N,least_N,slid_mm,way_mm,friction,lifted_mm,slips,"
@@ -176,7 +163,5 @@ std::string World::cells() const {
   }
   return text;
 }
-
-std::vector<std::string> World::take_events() { return std::exchange(events_, {}); }
 
 } // namespace fingertip::cell

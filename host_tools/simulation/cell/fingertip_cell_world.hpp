@@ -11,6 +11,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace fingertip::cell {
@@ -44,7 +45,7 @@ public:
   bool disturb(Event::Kind kind, double amount);
   void take_away() { is_there_ = false; }
 
-  Pressures pressures_Pa(std::size_t finger) const;
+  Pressures pressures_Pa(std::size_t finger) const { return is_there_ ? face_.base_Pa(cell_.patch(finger)) : Pressures{}; }
   // Without a force where nothing is touched.
   Patch patch(std::size_t finger) const { return is_there_ ? cell_.patch(finger) : Patch{}; }
 
@@ -56,7 +57,7 @@ public:
   static const char *columns();
   std::string cells() const;
   // What has happened since it was last asked: "lift", "slick", "slip", "dropped", ...
-  std::vector<std::string> take_events();
+  std::vector<std::string> take_events() { return std::exchange(events_, {}); }
 
 private:
   static constexpr double TOUCHED_N = 0.05;
@@ -76,8 +77,9 @@ private:
   };
   std::optional<Steady> steady_; // the force
   std::vector<bool> begun_;      // of the events
-  bool is_there_ = true, is_dropped_ = false, is_crushed_ = false, slips_ = false;
-  double time_s_ = 0.0, peak_N_ = 0.0, slid_before_mm_ = 0.0, slipped_s_ = 0.0;
+  bool is_there_ = true, is_dropped_ = false, is_crushed_ = false;
+  Slips slips_;
+  double time_s_ = 0.0, peak_N_ = 0.0;
   std::optional<double> lift_s_;
 };
 

@@ -13,32 +13,17 @@ constexpr double SERVO_BACKLASH_mm = 1.75;
 constexpr double ROBOTIQ_ACTIVATION_s = 2.0;
 
 GripperMechanics gripper_mechanics(const std::string &model) {
-  GripperMechanics mechanics;
   if (model == "ideal") {
-    mechanics.traits = {.model = model,
-                        .stroke_mm = 85.0,
-                        .step_mm = 0.01,
-                        .speed_min_mm_s = 0.1,
-                        .speed_max_mm_s = 250.0,
-                        .force_max_N = 200.0,
-                        .latency_s = 0.003,
-                        .poll_s = 0.001};
-    return mechanics;
+    return {{{85.0, 0.01, 0.0, 0.1, 250.0, 0.0, 200.0, 0.003, 0.001}, model}};
   }
-  mechanics.traits = gripper_traits(model);
-  if (mechanics.traits.driver == GripperDriver::feetech) {
-    mechanics.backlash_mm = SERVO_BACKLASH_mm;
-  } else {
-    mechanics.activation_s = ROBOTIQ_ACTIVATION_s;
-  }
-  return mechanics;
+  const GripperTraits &traits = gripper_traits(model);
+  const bool is_servo = traits.driver == GripperDriver::feetech;
+  return {traits, is_servo ? SERVO_BACKLASH_mm : 0.0, is_servo ? 0.0 : ROBOTIQ_ACTIVATION_s};
 }
 
 GripperMotion::GripperMotion(const GripperMechanics &mechanics)
     : mechanics_(mechanics), phase_(Phase::off), drive_mm_(mechanics.traits.stroke_mm), fingers_mm_(drive_mm_), target_mm_(drive_mm_),
       speed_mm_s_(mechanics.traits.speed_max_mm_s), force_N_(mechanics.traits.force_max_N) {}
-
-bool GripperMotion::blocks(double width_mm, double force_N) const { return blocked_at && blocked_at(width_mm, force_N); }
 
 double GripperMotion::nearest_step_mm(double width_mm) const {
   const GripperTraits &traits = mechanics_.traits;
@@ -50,15 +35,10 @@ double GripperMotion::nearest_step_mm(double width_mm) const {
   return std::clamp(std::round(width_mm / traits.step_mm) * traits.step_mm, 0.0, traits.stroke_mm);
 }
 
-double GripperMotion::reported_width_mm() const { return nearest_step_mm(drive_mm_); }
-
 void GripperMotion::activate() {
-  commands_.clear();
-  asked_.reset();
+  power_off();
   phase_ = mechanics_.activation_s > 0 ? Phase::opening : Phase::active;
   phase_began_s_ = time_s_;
-  blocked_ = 0;
-  moving_ = false;
   target_mm_ = drive_mm_;
 }
 
@@ -87,21 +67,13 @@ void GripperMotion::stop() {
 
 void GripperMotion::take(const Command &command) {
   const GripperTraits &traits = mechanics_.traits;
-  if (command.stop) {
-    moving_ = false;
-    target_mm_ = drive_mm_;
-    return;
+  target_mm_ = nearest_step_mm(command.move.width_mm);
+  moving_ = !command.stop && std::abs(target_mm_ - drive_mm_) >= traits.deadband_mm;
+  target_mm_ = moving_ ? target_mm_ : drive_mm_;
+  if (!command.stop) {
+    speed_mm_s_ = std::clamp(command.move.speed_mm_s, traits.speed_min_mm_s, traits.speed_max_mm_s);
+    force_N_ = std::clamp(command.move.force_N, traits.force_min_N, traits.force_max_N);
   }
-  speed_mm_s_ = std::clamp(command.move.speed_mm_s, traits.speed_min_mm_s, traits.speed_max_mm_s);
-  force_N_ = std::clamp(command.move.force_N, traits.force_min_N, traits.force_max_N);
-  const double target_mm = nearest_step_mm(command.move.width_mm);
-  if (std::abs(target_mm - drive_mm_) < traits.deadband_mm) {
-    moving_ = false;
-    target_mm_ = drive_mm_;
-    return;
-  }
-  target_mm_ = target_mm;
-  moving_ = true;
 }
 
 void GripperMotion::follow() {
@@ -139,7 +111,7 @@ void GripperMotion::drive_to(double target_mm, double speed_mm_s, double force_N
 
 void GripperMotion::run(double seconds) {
   const GripperTraits &traits = mechanics_.traits;
-  if (phase_ == Phase::opening || phase_ == Phase::closing || phase_ == Phase::reopening) {
+  if (activating()) {
     /* Each search takes its share of the time, however far it has to go. */
     const double share_s = mechanics_.activation_s / 3;
     const double target_mm = phase_ == Phase::closing ? 0.0 : traits.stroke_mm;
@@ -165,9 +137,8 @@ void GripperMotion::step(double seconds) {
   while (!commands_.empty() && commands_.front().due_s <= end_s) {
     const Command command = commands_.front();
     commands_.pop_front();
-    const double until_s = std::max(time_s_, command.due_s);
-    const double before_s = until_s - time_s_;
-    time_s_ = until_s;
+    const double before_s = std::max(time_s_, command.due_s) - time_s_;
+    time_s_ = std::max(time_s_, command.due_s);
     run(before_s);
     blocked_ = 0;
     take(command);
@@ -192,9 +163,7 @@ GripperStatus GripperMotion::status() const {
   GripperStatus status;
   status.active = active();
   status.moving = moving();
-  if (!status.moving) {
-    status.object = blocked_ != 0;
-  }
+  status.object = status.moving ? std::nullopt : std::optional(blocked_ != 0);
   status.width_mm = reported_width_mm();
   return status;
 }

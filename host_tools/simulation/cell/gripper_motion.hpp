@@ -1,14 +1,5 @@
 // How a simulated gripper's fingers move, in simulated time: no line, no clock, no chance.
 //
-//   GripperMotion motion(gripper_mechanics("ideal"));
-//   motion.blocked_at = [&](double width_mm, double force_N) { return ...; };
-//   motion.activate();
-//   motion.move({.width_mm = 20, .speed_mm_s = 50, .force_N = 20});
-//   for (...) {
-//     motion.step(0.0005);
-//     squeeze(motion.width_mm());
-//   }
-//
 // A command counts after the latency, and one that came later replaces it only after its own. Fingers run at constant speed to the nearest
 // step and stop at once; what accelerates is not modelled, and nothing but backlash lets an object push them apart: a 2F-85's screw holds,
 // a servo would yield. Latencies and the servo's backlash are assumptions, no measurements.
@@ -59,7 +50,7 @@ public:
   // The true width between the fingers.
   double width_mm() const { return fingers_mm_; }
   // The width that the gripper reports: its drive's position, in its steps.
-  double reported_width_mm() const;
+  double reported_width_mm() const { return nearest_step_mm(drive_mm_); }
   // Between -1 (closing at full speed) and 1, for the currents that a gripper reports.
   double effort() const;
   bool active() const { return phase_ == Phase::active; }
@@ -81,7 +72,7 @@ private:
     GripperMove move;
   };
 
-  bool blocks(double width_mm, double force_N) const;
+  bool blocks(double width_mm, double force_N) const { return blocked_at && blocked_at(width_mm, force_N); }
   double nearest_step_mm(double width_mm) const;
   void take(const Command &command);
   void run(double seconds);

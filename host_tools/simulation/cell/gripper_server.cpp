@@ -41,14 +41,11 @@ void GripperServer::power(bool on) {
 }
 
 void GripperServer::take() {
-  Bytes frame;
-  while (slave_->take_frame(&came_, &frame)) {
-    if (!power_) {
-      continue;
-    }
+  const auto seconds = [](double time_s) { return std::chrono::duration_cast<HostTime::duration>(std::chrono::duration<double>(time_s)); };
+  for (Bytes frame; slave_->take_frame(&came_, &frame);) {
     const bool has_fault = trouble_.answers != 0;
     const LineFault fault = has_fault ? trouble_.fault : LineFault::none;
-    Bytes bytes = slave_->answer(frame, fault == LineFault::refused);
+    Bytes bytes = power_ ? slave_->answer(frame, fault == LineFault::refused) : Bytes();
     if (bytes.empty()) {
       continue;
     }
@@ -63,21 +60,14 @@ void GripperServer::take() {
     case LineFault::other_slave: bytes = slave_->of_other_slave(bytes); break;
     default: break;
     }
-    const auto seconds = [](double time_s) {
-      return std::chrono::duration_cast<HostTime::duration>(std::chrono::duration<double>(time_s));
-    };
     const std::size_t crossing = frame.size() + bytes.size();
     HostTime due = came_at_ + seconds(static_cast<double>(crossing) * BITS_PER_BYTE / slave_->baud());
-    if (has_fault) {
-      due += seconds(trouble_.late_s);
-    }
+    due += seconds(has_fault ? trouble_.late_s : 0.0);
     if (trouble_.latency_timer_s > 0) {
       const HostTime::duration tick = seconds(trouble_.latency_timer_s);
       due = HostTime((due.time_since_epoch() / tick + 1) * tick);
     }
-    if (has_fault && trouble_.answers > 0) {
-      trouble_.answers--;
-    }
+    trouble_.answers -= trouble_.answers > 0;
     if (!bytes.empty()) {
       answers_.push_back({due, bytes});
     }
@@ -85,11 +75,9 @@ void GripperServer::take() {
 }
 
 void GripperServer::send_due() {
-  while (!answers_.empty() && answers_.front().due <= host_now()) {
-    const Bytes bytes = answers_.front().bytes;
-    answers_.pop_front();
+  for (; !answers_.empty() && answers_.front().due <= host_now(); answers_.pop_front()) {
     // A port that is not read fills up; what does not fit is lost, as on any line.
-    port_.write(bytes.data(), bytes.size());
+    port_.write(answers_.front().bytes.data(), answers_.front().bytes.size());
   }
 }
 
@@ -101,8 +89,8 @@ void GripperServer::step(std::chrono::microseconds longest_wait) {
   port_.wait(until);
   const HostTime now = host_now();
   if (real_time_) {
-    const double late_s = std::chrono::duration<double>(now - stepped_at_).count();
-    double passed_s = std::min(late_s, std::chrono::duration<double>(longest_wait).count() + STALL_s);
+    using Seconds = std::chrono::duration<double>;
+    double passed_s = std::min(Seconds(now - stepped_at_).count(), Seconds(longest_wait).count() + STALL_s);
     for (; passed_s > 0; passed_s -= LONGEST_STEP_s) {
       motion_.step(std::min(passed_s, LONGEST_STEP_s));
     }

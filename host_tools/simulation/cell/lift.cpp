@@ -24,15 +24,6 @@ constexpr std::int64_t LONGEST_ROUND_us = 10'000; // of the world's time
 constexpr std::int64_t LATE_us = 30'000;          // the world waits for what is later than that
 constexpr std::size_t FINGERS = 2;
 
-std::vector<FingerProcess> fingers_of(const LiftOptions &options, const Place &place) {
-  std::vector<FingerProcess> fingers;
-  for (std::size_t i = 0; i < FINGERS; i++) {
-    fingers.push_back(place.finger(i, options.seed, options.gain_spread.value_or(0.05)));
-    fingers.back().calibrated_sd = options.gain_sd;
-  }
-  return fingers;
-}
-
 // Lines of standard input, as long as it may be read.
 class Lines {
 public:
@@ -101,7 +92,8 @@ void open_gripper(GripperServer &server, GripperMotion &motion, const std::strin
 class Lift {
 public:
   Lift(const LiftOptions &options, const Place &place)
-      : options_(options), place_(place), face_(options.face, LAYER_mm, options.cache), fingers_(place, fingers_of(options, place)),
+      : options_(options), place_(place), face_(options.face, LAYER_mm, options.cache),
+        fingers_(place, place.fingers(FINGERS, options.seed, options.gain_spread.value_or(0.05), false, options.gain_sd)),
         motion_(GripperServer::mechanics(options.model)), server_(motion_, server_options()) {
     fingers_.wait_until_ready();
     open_gripper(server_, motion_, options.model, options.world.grasp.width_mm + options.opens_mm);
@@ -114,8 +106,7 @@ public:
   }
 
   void run() {
-    std::printf("ready: %s, %s, %s\n", place_.port(SIDES[0]).c_str(), place_.port(SIDES[1]).c_str(), place_.port("gripper").c_str());
-    std::fflush(stdout);
+    place_.print_ready(FINGERS, ", " + place_.port("gripper"));
     const std::int64_t began_us = steady_now_us();
     last_us_ = began_us;
     while (!interrupted && !over_) {
@@ -233,45 +224,35 @@ private:
 
   bool act(const std::string &verb, const std::string &what) {
     const auto number = to_double(what);
+    const bool is_positive = number && *number >= 0.0;
+    const auto finger = static_cast<std::size_t>(std::find(SIDES.begin(), SIDES.end(), what) - SIDES.begin());
+    const bool is_finger = finger < FINGERS && fingers_.is_there(finger);
+    const auto *fault = find_in(line_faults(), [&](const auto &one) { return what == one.first; });
     if (verb == "lift") {
       return world_->lift();
     }
-    if (verb == "take") {
-      world_->take_away();
-      return true;
-    }
-    if (verb == "quit") {
-      over_ = true;
-      return true;
-    }
-    if (verb == "kill" || verb == "freeze" || verb == "thaw") {
-      const auto side = std::find(SIDES.begin(), SIDES.end(), what);
-      const auto finger = static_cast<std::size_t>(side - SIDES.begin());
-      if (finger == FINGERS || !fingers_.is_there(finger)) {
-        return false;
-      }
-      verb == "kill" ? fingers_.end(finger) : fingers_.freeze(finger, verb == "freeze");
-      return true;
-    }
-    if (verb == "line") {
-      const auto *known = find_in(line_faults(), [&](const auto &one) { return what == one.first; });
-      if (!known) {
-        return false;
-      }
-      line_.fault = known->second;
-    } else if (verb == "late" && number && *number >= 0.0) {
-      line_.late_s = 1e-3 * *number;
-    } else if (verb == "latency_timer" && number && *number >= 0.0) {
-      line_.latency_timer_s = 1e-3 * *number;
-    } else if (verb == "power" && (what == "on" || what == "off")) {
-      server_.power(what == "on");
-      return true;
-    } else if (verb == "fault" && number && *number >= 0.0 && *number <= 255.0) {
-      server_.fail(static_cast<std::uint8_t>(*number));
-      return true;
-    } else if (is_disturbance(verb)) {
+    if (is_disturbance(verb)) {
       const Planned now = planned(verb + ":" + what);
       return world_->disturb(now.kind, now.amount);
+    }
+    if (verb == "take") {
+      world_->take_away();
+    } else if (verb == "quit") {
+      over_ = true;
+    } else if (verb == "kill" && is_finger) {
+      fingers_.end(finger);
+    } else if ((verb == "freeze" || verb == "thaw") && is_finger) {
+      fingers_.freeze(finger, verb == "freeze");
+    } else if (verb == "power" && (what == "on" || what == "off")) {
+      server_.power(what == "on");
+    } else if (verb == "fault" && is_positive && *number <= 255.0) {
+      server_.fail(static_cast<std::uint8_t>(*number));
+    } else if (verb == "line" && fault) {
+      line_.fault = fault->second;
+    } else if (verb == "late" && is_positive) {
+      line_.late_s = 1e-3 * *number;
+    } else if (verb == "latency_timer" && is_positive) {
+      line_.latency_timer_s = 1e-3 * *number;
     } else {
       return false;
     }

@@ -57,17 +57,22 @@ Place::~Place() {
   close(lock_);
 }
 
-FingerProcess Place::finger(std::size_t side, std::uint64_t seed, double gain_sd) const {
-  FingerProcess finger;
-  finger.serial = SERIALS[side];
-  finger.link = port(SIDES[side]);
-  finger.seed = 2 * seed + side;
-  finger.layer_mm = LAYER_mm;
-  Random random(finger.seed, GAINS, 0);
-  for (double &gain : finger.gain) {
-    gain = 1.0 + std::clamp(gain_sd * random.normal(), -0.5, 0.5);
+std::vector<FingerProcess> Place::fingers(std::size_t count, std::uint64_t seed, double gain_sd, bool parallel_bus,
+                                          std::optional<double> calibrated_sd) const {
+  std::vector<FingerProcess> fingers;
+  for (std::size_t i = 0; i < count; i++) {
+    FingerProcess &finger = fingers.emplace_back(FingerProcess{SERIALS[i], port(SIDES[i]), 2 * seed + i, {}, calibrated_sd, parallel_bus});
+    Random random(finger.seed, GAINS, 0);
+    for (double &gain : finger.gain) {
+      gain = 1.0 + std::clamp(gain_sd * random.normal(), -0.5, 0.5);
+    }
   }
-  return finger;
+  return fingers;
+}
+
+void Place::print_ready(std::size_t fingers, const std::string &more) const {
+  std::printf("ready: %s%s%s\n", port(SIDES[0]).c_str(), fingers > 1 ? (", " + port(SIDES[1])).c_str() : "", more.c_str());
+  std::fflush(stdout);
 }
 
 Fingers::Fingers(const Place &place, const std::vector<FingerProcess> &fingers) : fingers_(fingers), processes_(fingers.size()) {

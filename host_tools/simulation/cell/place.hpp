@@ -14,7 +14,6 @@
 
 namespace fingertip::cell {
 
-constexpr double LAYER_mm = 12.0;
 constexpr std::array<const char *, 2> SIDES = {"left", "right"};
 
 // Signals that end a simulation set it.
@@ -40,8 +39,11 @@ public:
 
   bool is_shared() const { return is_shared_; }
   std::string port(const std::string &name) const { return folder_ + "/" + name; }
-  // The process of this side, on its port, and its sensors' gains; the caller fills in the rest.
-  FingerProcess finger(std::size_t side, std::uint64_t seed, double gain_sd) const;
+  // The processes of the first sides, on their ports, with gains of their own.
+  std::vector<FingerProcess> fingers(std::size_t count, std::uint64_t seed, double gain_sd, bool parallel_bus,
+                                     std::optional<double> calibrated_sd = {}) const;
+  // Prints their ports, and of what else is there.
+  void print_ready(std::size_t fingers, const std::string &more = "") const;
 
 private:
   std::string folder_;

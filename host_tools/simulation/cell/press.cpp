@@ -102,15 +102,6 @@ private:
   std::vector<double> base_Pa_, sensed_Pa_; // [sensor]
 };
 
-std::vector<FingerProcess> fingers_of(const PressOptions &options, const Place &place) {
-  std::vector<FingerProcess> fingers;
-  for (std::size_t i = 0; i < options.fingertips; i++) {
-    fingers.push_back(place.finger(i, options.seed, options.gain_spread.value_or(0.1)));
-    fingers.back().parallel_bus = true;
-  }
-  return fingers;
-}
-
 std::string head_of(const PressOptions &options, const std::vector<FingerProcess> &fingers) {
   std::ostringstream text;
   text << "# simulated: the truth of presses; time_us is CLOCK_MONOTONIC\n# weight_g: " << options.weight_g << "\n# seed: " << options.seed;
@@ -128,16 +119,6 @@ std::string head_of(const PressOptions &options, const std::vector<FingerProcess
   }
   text << "\n";
   return text.str();
-}
-
-void be_ready(Fingers &fingers, const Place &place) {
-  fingers.wait_until_ready();
-  std::printf("ready:");
-  for (std::size_t i = 0; i < fingers.count(); i++) {
-    std::printf("%s %s", i ? "," : "", place.port(SIDES[i]).c_str());
-  }
-  std::printf("\n");
-  std::fflush(stdout);
 }
 
 // What each round gives, of a host's time and of the time since it began, goes to the fingertips.
@@ -161,7 +142,7 @@ template <typename Round> void run(Fingers &fingers, std::optional<double> secon
 
 void press(const PressOptions &options, const Place &place) {
   const Face face(PRESS_FACE, LAYER_mm, options.cache);
-  const std::vector<FingerProcess> processes = fingers_of(options, place);
+  const auto processes = place.fingers(options.fingertips, options.seed, options.gain_spread.value_or(0.1), true);
   Fingers fingers(place, processes);
   Truth truth(options.truth, options.overwrite, head_of(options, processes));
   std::vector<Pressed> pressed;
@@ -172,7 +153,8 @@ void press(const PressOptions &options, const Place &place) {
   if (place.is_shared() || options.by_hand) {
     hands.emplace(place, fingers.count(), options.by_hand);
   }
-  be_ready(fingers, place);
+  fingers.wait_until_ready();
+  place.print_ready(fingers.count());
   if (options.by_hand) {
     std::fprintf(stderr, "press it with the pointer in the page: fingertip web\n");
   }
@@ -198,11 +180,10 @@ void press(const PressOptions &options, const Place &place) {
 }
 
 void validate(const ValidatedOptions &options, std::optional<double> seconds, const Place &place) {
-  FingerProcess process = place.finger(0, options.seed, 0.0); // the pad has its own gains
-  process.parallel_bus = true;
   std::optional<ValidatedPad> pad(std::in_place, options);
-  Fingers fingers(place, {process});
-  be_ready(fingers, place);
+  Fingers fingers(place, place.fingers(1, options.seed, 0.0, true)); // the pad has its own gains
+  fingers.wait_until_ready();
+  place.print_ready(1);
   std::uint32_t rates_set = fingers.rates_set(0);
   bool goes = false;
   double began_s = 0.0;

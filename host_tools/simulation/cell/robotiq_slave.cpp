@@ -1,9 +1,9 @@
-// A simulated Robotiq gripper: a Modbus slave and registers (gripper/robotiq_registers.hpp) over its motion.
+// A simulated Robotiq gripper: a Modbus slave and registers (gripper/robotiq.hpp) over its motion.
 //
 // After the manuals: activation begins where rACT rises and takes its time; a move before gives gFLT 7, one while it goes on gFLT 5 and is
 // done afterwards. Assumed, for nothing is public: gFLT 9 is reported once, by the first answer after a second of silence, and what moves
 // goes on; a move begins where a register of it changes or rGTO rises. Left out: automatic release, which the driver never asks for.
-#include "grasp/gripper/robotiq_registers.hpp"
+#include "grasp/gripper/robotiq.hpp"
 #include "simulation/cell/gripper_server.hpp"
 
 #include <algorithm>
@@ -28,17 +28,11 @@ public:
   double baud() const override { return BAUD; }
 
   bool take_frame(Bytes *came, Bytes *frame) override {
-    std::size_t size = 8;
-    if (came->size() < 2) {
+    if (came->size() < 8) {
       return false;
     }
     const std::size_t counted = (*came)[1] == WRITE ? 6 : (*came)[1] == WRITE_AND_READ ? 10 : 0;
-    if (counted != 0) {
-      if (came->size() <= counted) {
-        return false;
-      }
-      size = counted + (*came)[counted] + 3u;
-    }
+    const std::size_t size = counted == 0 ? 8 : counted < came->size() ? counted + (*came)[counted] + 3u : counted + 1;
     if (came->size() < size) {
       return false;
     }

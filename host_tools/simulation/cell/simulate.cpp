@@ -89,100 +89,80 @@ int main(int argc, char **argv) {
   std::vector<std::string> planned_texts;
   bool is_press = false, by_command = false;
   double lift_after_s = *options.lift.world.lift_after_s;
-  CLI::Option *press_flag = app.add_flag("--press", is_press,
-                                         "A weight on a ball of 15 mm is set down here and there, for two seconds each time; this is "
-                                         "what happens without an option");
-  CLI::Option *mouse_flag = app.add_flag("--mouse", options.press.by_hand,
-                                         "A hand presses the ball: yours, with the pointer on the pad in the page of "
-                                         "`fingertip web`")
-                                ->excludes(press_flag);
-  CLI::Option *lift_flag = app.add_flag("--lift", "Two fingertips on a gripper with an object between: `fingertip grasp "
-                                                  "--gripper 2f85 --gripper-port sim:gripper` grasps it, then a hand lifts it. "
-                                                  "Obeys lines of standard input (help lists them)")
-                               ->excludes(press_flag)
-                               ->excludes(mouse_flag);
-  CLI::Option *validate_flag = app.add_flag("--validate", "A hand that goes through the steps of `fingertip validate`, when that "
-                                                          "begins: the weight at each mark of the template, a hold, a rest")
-                                   ->excludes(press_flag, mouse_flag, lift_flag);
-  app.add_option("--pull", options.pull_g,
-                 "The hand of --validate pulls a thread in the end, with this weight, for "
-                 "`fingertip validate --pull`")
-      ->needs(validate_flag)
-      ->check(CLI::Range(10.0, 1000.0))
-      ->type_name("GRAMS");
-  const auto number = [&](const char *name, double &value, const char *unit, double low, double high, const char *help) {
-    return app.add_option(name, value, help)->type_name(unit)->check(CLI::Range(low, high))->capture_default_str();
+  const auto add = [&](const char *name, auto &value, const char *unit, const char *help) {
+    return app.add_option(name, value, help)->type_name(unit);
   };
-  app.add_option("--ports", options.ports,
-                 "Folder for the ports left, right and gripper, which FINGERTIP_PORT may name; no "
-                 "program finds the fingertips by itself then, and one at a time may use each")
-      ->type_name("FOLDER");
-  app.add_option("--seed", options.seed, "Of gains, noise and places; default 1")->type_name("N");
-  app.add_option("--gain-spread", options.gain_spread, "Standard deviation between sensors; default 0.1, with --lift 0.05")
-      ->type_name("SHARE")
-      ->check(CLI::Range(0.0, 0.2));
-  app.add_option("--seconds", options.seconds, "End after this time")->type_name("S")->check(CLI::Range(0.1, 1e6));
-  app.add_option("--truth", options.truth, "Keeps what is true")->type_name("FILE.csv");
-  app.add_flag("--overwrite", options.overwrite, "Replace FILE.csv if it exists");
-  app.add_option("--cache", options.cache, "Of contact tables; default: those installed, else ~/.cache/fingertip")->type_name("FOLDER");
-
-  app.add_option("--fingertips", options.press.fingertips, "How many")
-      ->excludes(lift_flag)
-      ->check(CLI::Range(1, 2))
-      ->group("Presses")
-      ->type_name("N")
-      ->capture_default_str();
-  app.add_option("--weight", options.press.weight_g, "What is set down")
-      ->excludes(lift_flag)
-      ->check(CLI::Range(20.0, 2000.0))
-      ->group("Presses")
-      ->type_name("GRAMS")
-      ->capture_default_str();
-
   std::vector<CLI::Option *> of_lift;
+  const auto for_lift = [&](CLI::Option *option) { return of_lift.emplace_back(option); };
   const auto lift_number = [&](const char *name, double &value, const char *unit, double low, double high, const char *help) {
-    of_lift.push_back(number(name, value, unit, low, high, help));
-    return of_lift.back();
+    return for_lift(add(name, value, unit, help)->check(CLI::Range(low, high))->capture_default_str());
   };
-  of_lift.push_back(app.add_option("--gripper", options.lift.model, "Which one")
-                        ->check(CLI::IsMember(texts_of(gripper_models(), [](const auto &one) { return one.model; })))
-                        ->capture_default_str());
-  of_lift.push_back(
-      app.add_option("--face", options.lift.face, "The indenter whose pressures a point of the object has, and a line or an area in a row")
-          ->capture_default_str());
+
+  CLI::Option *press_flag = app.add_flag(
+      "--press", is_press,
+      "A weight on a ball of 15 mm is set down here and there, for two seconds each time; this is what happens without an option");
+  CLI::Option *mouse_flag = app.add_flag("--mouse", options.press.by_hand,
+                                         "A hand presses the ball: yours, with the pointer on the pad in the page of `fingertip web`");
+  CLI::Option *lift_flag =
+      app.add_flag("--lift", "Two fingertips on a gripper with an object between: `fingertip grasp --gripper 2f85 --gripper-port "
+                             "sim:gripper` grasps it, then a hand lifts it. Obeys lines of standard input (help lists them)");
+  CLI::Option *validate_flag =
+      app.add_flag("--validate", "A hand that goes through the steps of `fingertip validate`, when that begins: the weight at each mark of "
+                                 "the template, a hold, a rest");
+  mouse_flag->excludes(press_flag);
+  lift_flag->excludes(press_flag, mouse_flag);
+  validate_flag->excludes(press_flag, mouse_flag, lift_flag);
+  add("--pull", options.pull_g, "GRAMS",
+      "The hand of --validate pulls a thread in the end, with this weight, for `fingertip validate --pull`")
+      ->needs(validate_flag)
+      ->check(CLI::Range(10.0, 1000.0));
+  add("--ports", options.ports, "FOLDER",
+      "Folder for the ports left, right and gripper, which FINGERTIP_PORT may name; no program finds the fingertips by itself then, and "
+      "one at a time may use each");
+  add("--seed", options.seed, "N", "Of gains, noise and places; default 1");
+  add("--gain-spread", options.gain_spread, "SHARE", "Standard deviation between sensors; default 0.1, with --lift 0.05")
+      ->check(CLI::Range(0.0, 0.2));
+  add("--seconds", options.seconds, "S", "End after this time")->check(CLI::Range(0.1, 1e6));
+  add("--truth", options.truth, "FILE.csv", "Keeps what is true");
+  app.add_flag("--overwrite", options.overwrite, "Replace FILE.csv if it exists");
+  add("--cache", options.cache, "FOLDER", "Of contact tables; default: those installed, else ~/.cache/fingertip");
+  for (CLI::Option *option : {add("--fingertips", options.press.fingertips, "N", "How many")->check(CLI::Range(1, 2)),
+                              add("--weight", options.press.weight_g, "GRAMS", "What is set down")->check(CLI::Range(20.0, 2000.0))}) {
+    option->excludes(lift_flag)->group("Presses")->capture_default_str();
+  }
+
+  for_lift(app.add_option("--gripper", options.lift.model, "Which one"))
+      ->check(CLI::IsMember(texts_of(gripper_models(), [](const auto &one) { return one.model; })))
+      ->capture_default_str();
+  for_lift(
+      app.add_option("--face", options.lift.face, "The indenter whose pressures a point of the object has, and a line or an area in a row"))
+      ->capture_default_str();
   CLI::Option *kind = app.add_option("--kind", options.kind, "A grasp of this kind, drawn by the seed: object, lift, and what happens then")
                           ->check(CLI::IsMember(texts_of(KINDS, name_of_any)));
   const std::size_t before_drawn = of_lift.size();
-  of_lift.push_back(
-      app.add_option("--shape", shape, "Of the object")->check(CLI::IsMember(texts_of(SHAPES, name_of_any)))->capture_default_str());
+  for_lift(app.add_option("--shape", shape, "Of the object"))->check(CLI::IsMember(texts_of(SHAPES, name_of_any)))->capture_default_str();
   lift_number("--width", object.width_mm, "MM", 1.0, 500.0, "Of the object, between the fingers");
   lift_number("--length", object.height_mm, "MM", 1.0, 500.0, "Of a cylinder, and the height of a box or plate");
   lift_number("--off-centre", object.com_mm.x, "MM", 0.0, 250.0, "Of its centre of mass, level");
   lift_number("--mass", object.mass_kg, "KG", 0.001, 10.0, "Its mass");
   lift_number("--friction", friction, "NUMBER", 0.05, 3.0, "Its friction coefficient");
   lift_number("--kinetic", object.kinetic_share, "SHARE", 0.3, 1.0, "Of the friction, while it slides");
-  const std::size_t stiffness = of_lift.size();
-  of_lift.push_back(app.add_option("--stiffness", object.stiffness_N_mm, "Its stiffness; default: it does not yield")
-                        ->type_name("N/MM")
-                        ->check(CLI::Range(0.1, 1e6)));
-  of_lift.push_back(app.add_option("--crushes", object.crushes_N, "More force breaks it; default: none does")
-                        ->type_name("N")
-                        ->check(CLI::Range(0.1, 1e6)));
+  const CLI::Option *stiffness =
+      for_lift(add("--stiffness", object.stiffness_N_mm, "N/MM", "Its stiffness; default: it does not yield"))->check(CLI::Range(0.1, 1e6));
+  for_lift(add("--crushes", object.crushes_N, "N", "More force breaks it; default: none does"))->check(CLI::Range(0.1, 1e6));
   lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0, "How much wider than the object the gripper is at first");
   lift_number("--height", object.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
   lift_number("--lift-time", object.lift_s, "S", 0.05, 60.0, "And how long that takes");
   for (std::size_t i = before_drawn; i < of_lift.size(); i++) {
-    if (i != stiffness) { // no kind sets it
+    if (of_lift[i] != stiffness) { // no kind sets it
       kind->excludes(of_lift[i]);
     }
   }
-  of_lift.push_back(kind);
+  for_lift(kind);
   CLI::Option *after = lift_number("--lift-after", lift_after_s, "S", 0.1, 1e6, "Lift once the force has been steady for this time");
-  of_lift.push_back(app.add_flag("--by-command", by_command, "Lift only on the command")->excludes(after));
-  of_lift.push_back(app.add_option("--then", planned_texts,
-                                   "A disturbance: pour:MASSES, jerk:M/S2, knock:M/S, slick:SHARE, or lower:SECONDS onto "
-                                   "the table, @SECONDS after the lift")
-                        ->type_name("KIND:AMOUNT@S"));
+  for_lift(app.add_flag("--by-command", by_command, "Lift only on the command"))->excludes(after);
+  for_lift(add("--then", planned_texts, "KIND:AMOUNT@S",
+               "A disturbance: pour:MASSES, jerk:M/S2, knock:M/S, slick:SHARE, or lower:SECONDS onto the table, @SECONDS after the lift"));
   lift_number("--gain-error", options.lift.gain_sd, "SHARE", 0.0, 0.2, "That calibration left of the gains");
   lift_number("--patience", options.lift.patience_s, "S", 0.0, 3600.0,
               "Longest pause of the world while fingertips or the gripper's client are held up");

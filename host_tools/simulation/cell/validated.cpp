@@ -12,6 +12,7 @@ extern "C" {
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace fingertip::cell {
 namespace {
@@ -84,10 +85,7 @@ ValidatedPad::ValidatedPad(const ValidatedOptions &options)
   same.report(RESTS_s, nothing, settled);
   same.report(RESTS_s + MOVES_s, all, settled);
   same.report(RESTS_s + MOVES_s + SETTLED_s, all, settled);
-  double sum = 0.0;
-  for (double reading : settled) {
-    sum += reading;
-  }
+  const double sum = std::accumulate(settled.begin(), settled.end(), 0.0);
   for (double reading : settled) {
     gains_.push_back(reading * double(SENSORS) / sum);
   }

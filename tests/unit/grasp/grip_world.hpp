@@ -17,19 +17,7 @@ extern "C" {
 namespace fingertip::test {
 
 // A gripper of fine steps that answers soon.
-inline GripperTraits fine_gripper() {
-  GripperTraits traits;
-  traits.model = "fine";
-  traits.stroke_mm = 85.0;
-  traits.step_mm = 0.01;
-  traits.speed_min_mm_s = 1.0;
-  traits.speed_max_mm_s = 150.0;
-  traits.force_min_N = 20.0;
-  traits.force_max_N = 235.0;
-  traits.latency_s = 0.003;
-  traits.poll_s = 0.001;
-  return traits;
-}
+inline GripperTraits fine_gripper() { return {{85.0, 0.01, 0.0, 1.0, 150.0, 20.0, 235.0, 0.003, 0.001}, "fine"}; }
 
 class GripWorld {
 public:

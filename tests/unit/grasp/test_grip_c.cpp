@@ -28,7 +28,7 @@ std::size_t allocations = 0;
 namespace {
 
 const fingertip_grip_traits TRAITS = {85, 0.1, 0, 1, 150, 1, 100, 0.008, 0.002};
-const GripperTraits SAME = {"gripper", 85, 0.1, 0, 1, 150, 1, 100, 0.008, 0.002};
+const GripperTraits SAME = {TRAITS, "gripper"};
 
 wire_packet contact_at(double t_s, double force_N, double load_N) {
   wire_packet packet = {};

@@ -1,5 +1,4 @@
 #include "grasp/gripper/feetech.hpp"
-#include "grasp/gripper/feetech_table.hpp"
 #include "models.hpp"
 
 #include <cmath>
@@ -46,7 +45,7 @@ TEST(FeetechPacket, IsFoundInNoiseHoweverItComes) {
 TEST(Jaw, IsAChord) {
   for (const bool turns_down : {false, true}) {
     const int open = turns_down ? 1024 : 3072;
-    const Jaw jaw(2048, open, 80);
+    const Jaw jaw({.closed_count = 2048, .open_count = open, .jaw_mm = 80});
     EXPECT_NEAR(jaw.width_mm(2048), 0, 1e-12);
     EXPECT_NEAR(jaw.stroke_mm(), 2 * 80 * std::sin(std::numbers::pi / 4), 1e-9);
     EXPECT_LT(jaw.width_mm(turns_down ? 2060 : 2036), 0);

@@ -1,5 +1,4 @@
 #include "grasp/gripper/robotiq.hpp"
-#include "grasp/gripper/robotiq_registers.hpp"
 #include "models.hpp"
 
 #include <cmath>
