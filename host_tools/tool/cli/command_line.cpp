@@ -34,10 +34,6 @@ static std::size_t letters_apart(const std::string &one, const std::string &othe
   return row[other.size()];
 }
 
-static const std::map<std::string, std::string> EXAMPLES = {{"calibrate", "--weight 200"},        {"convert", "press.csv press.mcap"},
-                                                            {"record", "press.csv --seconds 10"}, {"set", "rate=max osr=256"},
-                                                            {"monitor", "--record press.mcap"},   {"replay", "press.csv --speed 2"}};
-
 template <typename Value>
 static CLI::Option *with_choice(CLI::App *command, const std::string &option, const std::map<std::string, Value> &values,
                                 const std::string &allowed, Value &value, const std::string &help) {
@@ -64,9 +60,6 @@ CommandLine::CommandLine(const std::string &description, const std::string &vers
 
 CLI::App *CommandLine::add(const std::string &name, const std::string &text, std::function<int()> run) {
   CLI::App *command = app_.add_subcommand(name, text);
-  if (const auto example = EXAMPLES.find(name); example != EXAMPLES.end()) {
-    command->footer("Example: fingertip " + name + " " + example->second);
-  }
   command->callback([this, run = std::move(run)] { chosen_ = run; });
   return command;
 }

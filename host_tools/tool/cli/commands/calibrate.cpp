@@ -526,6 +526,7 @@ void add_calibrate(CommandLine &line) {
     }
     return run_calibrate(*options);
   });
+  command->footer("Example: fingertip calibrate --weight 200");
   with_port(command, options->choice);
   CLI::Option *weight =
       with_weight(command, "--weight", calibrating::GRAVITY_N_PER_g, options->force_N, "Mass of the weight: then forces are calibrated too")

@@ -347,6 +347,7 @@ void add_set(CommandLine &line) {
   CLI::App *command =
       line.add("set", "Change settings until the next power-on, or for good with --keep", [options] { return set(*options); });
   with_port(command, options->choice);
+  command->footer("Example: fingertip set rate=max osr=256");
   with_value(command, "KEY=VALUE", "settings", options->settings, settings_help());
   CLI::Option *keep = command->add_flag("--keep", options->keep, "Keep all present settings: the fingertip starts with them from now on");
   command->add_flag("--forget", options->forget, "Keep none: from its next start on it has the firmware's defaults")->excludes(keep);

@@ -445,6 +445,7 @@ CLI::App *add(CommandLine &line, const std::string &name, const std::string &hel
 void add_monitor(CommandLine &line) {
   auto options = std::make_shared<LiveOptions>();
   CLI::App *command = add(line, "monitor", "Show live what fingertips feel", options);
+  command->footer("Example: fingertip monitor --record press.mcap");
   with_value(command, "FILE.csv|FILE.mcap", "--record", options->recording, "Record at the same time");
   with_colour(command, options->colour);
 }
@@ -452,10 +453,11 @@ void add_monitor(CommandLine &line) {
 void add_record(CommandLine &line) {
   auto options = std::make_shared<LiveOptions>();
   options->monitor = false;
-  add(line, "record", "Record every frame to a CSV or MCAP file, until Ctrl-C", options)
-      ->add_option("file", options->recording, "The recording to write, CSV or MCAP by its name; -: standard output, each row as it comes")
-      ->required()
-      ->type_name("FILE.csv|FILE.mcap|-");
+  CLI::App *command = add(line, "record", "Record every frame to a CSV or MCAP file, until Ctrl-C", options);
+  with_value(command, "FILE.csv|FILE.mcap|-", "file", options->recording,
+             "The recording to write, CSV or MCAP by its name; -: standard output, each row as it comes")
+      ->required();
+  command->footer("Example: fingertip record press.csv --seconds 10");
 }
 
 } // namespace fingertip

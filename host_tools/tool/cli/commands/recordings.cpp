@@ -325,6 +325,7 @@ int show(const ReplayOptions &options) {
 void add_replay(CommandLine &line) {
   auto options = std::make_shared<ReplayOptions>();
   CLI::App *command = line.add("replay", "Show a recording or a capture of bytes", [options] { return show(*options); });
+  command->footer("Example: fingertip replay press.csv --speed 2");
   with_value(command, "FILE", "file", options->file, "Recording (.csv, .mcap) or bytes of the line (.ftr)")->required();
   command
       ->add_option_function<std::string>(
@@ -341,6 +342,7 @@ void add_replay(CommandLine &line) {
 void add_convert(CommandLine &line) {
   auto options = std::make_shared<Conversion>();
   CLI::App *command = line.add("convert", "Turn a recording or a capture into another kind", [options] { return convert(*options); });
+  command->footer("Example: fingertip convert press.csv press.mcap");
   with_value(command, "FILE", "from", options->from, "Recording (.csv, .mcap) or bytes of the line (.ftr)")->required();
   with_value(command, "OUT.csv|OUT.mcap|OUT.ftr", "to", options->to, "File to write; its ending selects the format")->required();
   with_value(command, "SERIAL", "--device", options->device, "Serial number of one of several fingertips in the recording; only this one");
