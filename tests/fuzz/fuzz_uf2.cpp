@@ -16,18 +16,6 @@ using namespace fingertip;
 using Bytes = std::vector<std::uint8_t>;
 constexpr std::size_t BLOCK_BYTES = 512, PAGE_BYTES = 256, PAGE_AT = 32;
 
-// CRC-32/MPEG-2, as the boot ROM has it.
-static std::uint32_t boot2_crc(const std::uint8_t *bytes, std::size_t length) {
-  std::uint32_t crc = 0xFFFFFFFF;
-  for (std::size_t i = 0; i < length; i++) {
-    crc ^= static_cast<std::uint32_t>(bytes[i]) << 24;
-    for (int bit = 0; bit < 8; bit++) {
-      crc = crc << 1 ^ (crc & 0x80000000u ? 0x04C11DB7u : 0);
-    }
-  }
-  return crc;
-}
-
 static Bytes file_of(const Bytes &flash) {
   Bytes file(flash.size() / PAGE_BYTES * BLOCK_BYTES);
   const std::size_t count = flash.size() / PAGE_BYTES;

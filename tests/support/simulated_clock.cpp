@@ -192,7 +192,7 @@ struct Thread::State {
   Wake ended;
 };
 
-Thread::Thread(std::function<void()> run) : state_(std::make_unique<State>()) {
+Thread::Thread(std::function<void()> run) : state_(std::make_shared<State>()) {
   line.be_there();
   const int fd = connected();
   Line early; // says hello in its name: it is there from now on
@@ -222,10 +222,5 @@ void clock_expects(pid_t child) {
   line.be_there();
   line.say({Order::SPAWNED, child, 0, 0, {}});
 }
-
-Thread::Thread() = default;
-Thread::Thread(Thread &&) noexcept = default;
-Thread &Thread::operator=(Thread &&) noexcept = default;
-Thread::~Thread() = default;
 
 } // namespace fingertip

@@ -24,7 +24,7 @@ struct Thread::State {
   std::thread thread;
 };
 
-Thread::Thread(std::function<void()> run) : state_(std::make_unique<State>(State{std::thread(std::move(run))})) {}
+Thread::Thread(std::function<void()> run) : state_(std::make_shared<State>(State{std::thread(std::move(run))})) {}
 
 void Thread::join() {
   state_->thread.join();
@@ -32,10 +32,5 @@ void Thread::join() {
 }
 
 void clock_expects(pid_t) {}
-
-Thread::Thread() = default;
-Thread::Thread(Thread &&) noexcept = default;
-Thread &Thread::operator=(Thread &&) noexcept = default;
-Thread::~Thread() = default;
 
 } // namespace fingertip

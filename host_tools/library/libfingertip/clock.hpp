@@ -55,21 +55,20 @@ private:
   int fd_;
 };
 
-/* A thread that may wait by this clock. join waits by this clock, too. */
+/* A thread that may wait by this clock, and is joined, which waits by it too, or never started. */
 class Thread {
 public:
-  Thread();
+  Thread() = default;
   explicit Thread(std::function<void()> run);
-  Thread(Thread &&) noexcept;
-  Thread &operator=(Thread &&) noexcept;
-  ~Thread(); /* joined before, or never started */
+  Thread(Thread &&) = default;
+  Thread &operator=(Thread &&) = default;
 
   bool joinable() const { return state_ != nullptr; }
   void join();
 
 private:
   struct State;
-  std::unique_ptr<State> state_;
+  std::shared_ptr<State> state_;
 };
 
 /* Call it after fork, in the parent: there is another process that waits by this clock. */

@@ -12,7 +12,7 @@ class ByteSink {
 public:
   virtual ~ByteSink() = default;
 
-  /* All of them or none, and then it throws Error. */
+  /* All of them or none, and then it throws Error; where they wait to be written, a later call does. */
   virtual void append(const void *bytes, std::size_t length) = 0;
   /* Last of all. */
   virtual void finish() = 0;
@@ -30,7 +30,7 @@ bool is_same_file(const std::string &a, const std::string &b);
 class OutputFile : public ByteSink {
 public:
   enum class Appears {
-    at_once,           /* and grows: what was appended outlives a killed program */
+    at_once,           /* and grows: what append returned for outlives a killed program */
     when_finished,     /* whole, in one step; until then, and without finish, an older file stays */
     on_standard_output /* no file: the path only names it in messages */
   };

@@ -25,8 +25,7 @@ constexpr std::uint32_t FLASH_BYTES = 2u << 20;
 /* After the page of each block: this and the CRC-32 of all pages. */
 constexpr char CHECKSUM_MARK[] = "CRC ";
 
-/* RP2040 datasheet 2.8.1.3.1. */
-static std::uint32_t boot2_crc(const std::uint8_t *bytes, std::size_t length) {
+std::uint32_t boot2_crc(const std::uint8_t *bytes, std::size_t length) {
   std::uint32_t crc = 0xFFFFFFFF;
   for (std::size_t i = 0; i < length; i++) {
     crc ^= static_cast<std::uint32_t>(bytes[i]) << 24;

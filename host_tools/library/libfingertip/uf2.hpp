@@ -2,6 +2,7 @@
  * RP2040 (its datasheet, 2.8.4). The boot ROM takes any well-formed block without a look at its content. */
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -18,5 +19,7 @@ struct FirmwareImage {
 /* Throws Error unless the file is a whole, undamaged firmware of ours for the RP2040. name: for messages. */
 FirmwareImage read_firmware(const std::string &path);
 FirmwareImage firmware_of(const std::string &name, std::vector<std::uint8_t> file);
+/* CRC-32/MPEG-2, as the boot ROM checks its first page (RP2040 datasheet 2.8.1.3.1). */
+std::uint32_t boot2_crc(const std::uint8_t *bytes, std::size_t length);
 
 } // namespace fingertip

@@ -3,91 +3,87 @@
 #include "libfingertip/clock.hpp"
 #include "tool/cli/terminal.hpp"
 
-#include <cstdio>
 #include <ctime>
-#include <future>
 #include <utility>
 
 namespace fingertip {
 
-namespace {
-
-constexpr std::size_t QUEUE_bytes = 64 << 20; /* 5 s of the CSV text of sixteen fingertips at 1308 frames/s */
 constexpr std::chrono::milliseconds WRITE_INTERVAL{20};
 
-/* Another sink, written by another thread. */
-class QueuedSink : public ByteSink {
-public:
-  explicit QueuedSink(std::unique_ptr<ByteSink> sink) : sink_(std::move(sink)) {}
-  ~QueuedSink() override {
+QueuedSink::QueuedSink(const std::string &path, bool overwrite)
+    : QueuedSink(std::make_unique<OutputFile>(path, overwrite, OutputFile::Appears::at_once)) {}
+
+QueuedSink::QueuedSink(std::unique_ptr<ByteSink> sink, std::size_t capacity_bytes)
+    : sink_(std::move(sink)), capacity_bytes_(capacity_bytes), thread_([this] { run(); }) {}
+
+QueuedSink::~QueuedSink() {
+  ends_ = true;
+  wanted_.set();
+  thread_.join();
+}
+
+void QueuedSink::append(const void *bytes, std::size_t length) {
+  flush(capacity_bytes_);
+  std::lock_guard<std::mutex> lock(mutex_);
+  queue_.emplace_back(static_cast<const char *>(bytes), length);
+  queued_bytes_ += length;
+}
+
+void QueuedSink::finish() {
+  flush();
+  sink_->finish();
+}
+
+void QueuedSink::flush(std::size_t below_bytes) {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!failure_ && queued_bytes_ >= below_bytes) {
+    lock.unlock();
+    wanted_.set();
+    written_.wait(HostTime::max());
+    lock.lock();
+  }
+  if (failure_) {
+    std::rethrow_exception(failure_);
+  }
+}
+
+void QueuedSink::run() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!failure_ && !(ends_ && queue_.empty())) {
+    if (queue_.empty()) {
+      lock.unlock();
+      wanted_.wait(host_now() + WRITE_INTERVAL);
+      lock.lock();
+      continue;
+    }
+    const std::string &next = queue_.front(); /* append moves none of them */
+    lock.unlock();
+    std::exception_ptr failure;
     try {
-      write();
-      wait();
-    } catch (...) { /* finish would have thrown it */
+      sink_->append(next.data(), next.size());
+    } catch (...) {
+      failure = std::current_exception();
     }
+    lock.lock();
+    failure_ = failure;
+    queued_bytes_ -= next.size();
+    queue_.pop_front();
+    written_.set();
   }
-  void append(const void *bytes, std::size_t length) override {
-    if (!std::exchange(has_begun_, true)) {
-      sink_->append(bytes, length); /* here it throws where nothing can be written */
-      return;
-    }
-    queue_.emplace_back(static_cast<const char *>(bytes), length);
-    queued_bytes_ += length;
-    const bool is_idle = !writing_.valid() || writing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
-    if (queued_bytes_ >= QUEUE_bytes || (is_idle && host_now() >= next_)) {
-      write();
-    }
-  }
-  void finish() override {
-    write();
-    wait();
-    sink_->finish();
-  }
-  const std::string &path() const override { return sink_->path(); }
-
-private:
-  void write() {
-    wait();
-    next_ = host_now() + WRITE_INTERVAL;
-    queued_bytes_ = 0;
-    writing_ = std::async(std::launch::async, [this, queue = std::exchange(queue_, {})] {
-      for (const std::string &bytes : queue) {
-        sink_->append(bytes.data(), bytes.size());
-      }
-    });
-  }
-  void wait() {
-    if (writing_.valid()) {
-      auto queue = std::exchange(queue_, {}); /* nothing is written behind a gap */
-      writing_.get();
-      queue_ = std::move(queue);
-    }
-  }
-
-  std::unique_ptr<ByteSink> sink_;
-  std::vector<std::string> queue_;
-  std::size_t queued_bytes_ = 0;
-  bool has_begun_ = false;
-  HostTime next_{};
-  std::future<void> writing_;
-};
-
-} // namespace
-
-std::unique_ptr<ByteSink> make_queued_file(const std::string &path, bool overwrite) {
-  return std::make_unique<QueuedSink>(std::make_unique<OutputFile>(path, overwrite, OutputFile::Appears::at_once));
 }
 
 static RecordingWriter writer_of(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready, const std::string &port,
-                                 std::int64_t host_zero_us, const Metadata &extra) {
+                                 std::int64_t host_zero_us, const Metadata &extra, QueuedSink *&queue) {
   Metadata head = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"started_utc", utc_now()}};
   std::vector<wire_info> infos;
   for (const DeviceNews &each : ready) {
     infos.push_back(each.packet.body.info);
   }
   const bool both = sends_both(infos[0]);
-  auto lines = path == STDOUT_NAME ? make_lines(path, overwrite, OutputFile::Appears::on_standard_output)
-                                   : make_lines(make_queued_file(path, overwrite), is_mcap_name(path));
+  auto file = path == STDOUT_NAME ? nullptr : std::make_unique<QueuedSink>(path, overwrite);
+  queue = file.get();
+  auto lines =
+      file ? make_lines(std::move(file), is_mcap_name(path)) : make_lines(path, overwrite, OutputFile::Appears::on_standard_output);
   if (ready.size() > 1) {
     head.insert(head.end(), extra.begin(), extra.end());
     return RecordingWriter(std::move(lines), infos, head, host_zero_us, both);
@@ -108,14 +104,15 @@ std::string utc_now() {
   gmtime_r(&seconds, &parts);
   char text[32];
   std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%S", &parts);
-  char whole[48];
-  std::snprintf(whole, sizeof whole, "%s.%03dZ", text, static_cast<int>(ms));
-  return whole;
+  return std::string(text) + "." + std::to_string(1000 + ms).substr(1) + "Z";
 }
 
 LiveRecording::LiveRecording(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready, const std::string &port,
                              std::int64_t host_zero_us, const Metadata &extra)
-    : to_standard_output_(path == STDOUT_NAME), writer_(writer_of(path, overwrite, ready, port, host_zero_us, extra)) {
+    : writer_(writer_of(path, overwrite, ready, port, host_zero_us, extra, queue_)) {
+  if (queue_) {
+    queue_->flush(); /* the head: what cannot be written is known before anything moves */
+  }
   for (std::size_t i = 0; i < ready.size(); i++) {
     writer_.packet(i, ready[i].packet, static_cast<double>(host_zero_us));
   }
@@ -123,7 +120,7 @@ LiveRecording::LiveRecording(const std::string &path, bool overwrite, const std:
 
 /* A reader of standard output that is slow is waited for, unless the end is wanted. */
 bool LiveRecording::can_write() {
-  given_up_ = given_up_ || (to_standard_output_ && !wait_for_standard_output());
+  given_up_ = given_up_ || (!queue_ && !wait_for_standard_output());
   return !given_up_;
 }
 

@@ -36,11 +36,7 @@ private:
 /* Detects when a text changes. */
 class Change {
 public:
-  bool is_new(const std::string &text) {
-    bool changed = text != last_;
-    last_ = text;
-    return changed;
-  }
+  bool is_new(const std::string &text) { return std::exchange(last_, text) != text; }
 
 private:
   std::string last_;
@@ -53,11 +49,7 @@ std::string trouble_of(const Model &model) {
 }
 
 std::string troubles_of(const std::vector<Model> &models) {
-  std::string troubles;
-  for (const Model &model : models) {
-    troubles += trouble_of(model) + "\n";
-  }
-  return troubles;
+  return joined(models, "", [](const Model &model) { return trouble_of(model) + "\n"; });
 }
 
 std::string name_of(const Model &model) { return model.info() ? text_field(model.info()->serial) : model.source(); }

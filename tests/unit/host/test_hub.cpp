@@ -120,6 +120,11 @@ private:
 
 constexpr std::uint8_t BOTH = WIRE_STREAM_CONTACT | WIRE_STREAM_RAW;
 
+class GreetedHubTest : public HubTest {
+protected:
+  void SetUp() override { greet(); }
+};
+
 TEST_F(HubTest, AsksWhoIsThereAndForNoStreams) {
   hub.tick(now);
   auto asked = commands();
@@ -137,8 +142,7 @@ TEST_F(HubTest, AsksWhoIsThereAndForNoStreams) {
   EXPECT_EQ(std::string(hub.info()->serial, WIRE_TEXT_BYTES), "E660583883265A2C");
 }
 
-TEST_F(HubTest, AnswersGoToWhoAskedUnderTheirOwnNumbers) {
-  greet();
+TEST_F(GreetedHubTest, AnswersGoToWhoAskedUnderTheirOwnNumbers) {
   Program one = join(), other = join();
   other.sequence = 100; /* the same as the one's */
   command(one, command_info());
@@ -167,8 +171,7 @@ TEST_F(HubTest, AnswersGoToWhoAskedUnderTheirOwnNumbers) {
   EXPECT_EQ(other.decoder.statistics().dropped_packets, 0u);
 }
 
-TEST_F(HubTest, TheLineStreamsWhatAnyWantsAndEachGetsItsOwn) {
-  greet();
+TEST_F(GreetedHubTest, TheLineStreamsWhatAnyWantsAndEachGetsItsOwn) {
   Program one = join(), other = join(), idle = join();
   command(one, command_stream(WIRE_STREAM_CONTACT));
   answer(streams_on_line(WIRE_STREAM_CONTACT));
@@ -196,8 +199,7 @@ TEST_F(HubTest, TheLineStreamsWhatAnyWantsAndEachGetsItsOwn) {
   EXPECT_EQ(one.count_of(WIRE_CONTACT), 2u) << "until it was acknowledged";
 }
 
-TEST_F(HubTest, WhoeverLeavesWantsNothing) {
-  greet();
+TEST_F(GreetedHubTest, WhoeverLeavesWantsNothing) {
   Program one = join(), other = join();
   stream(one, BOTH);
   stream(other, WIRE_STREAM_CONTACT);
@@ -216,8 +218,7 @@ TEST_F(HubTest, WhoeverLeavesWantsNothing) {
   EXPECT_EQ(other.decoder.statistics().dropped_packets, 0u);
 }
 
-TEST_F(HubTest, WishesThatCrossOneAnotherAllComeTrue) {
-  greet();
+TEST_F(GreetedHubTest, WishesThatCrossOneAnotherAllComeTrue) {
   Program one = join(), other = join();
   stream(one, BOTH);
   command(one, command_stream(0)); /* not answered yet */
@@ -232,8 +233,7 @@ TEST_F(HubTest, WishesThatCrossOneAnotherAllComeTrue) {
   EXPECT_EQ(commands().at(1).body.cmd_stream.streams & BOTH, BOTH);
 }
 
-TEST_F(HubTest, ARefusedWishIsItsOwnersAlone) {
-  greet();
+TEST_F(GreetedHubTest, ARefusedWishIsItsOwnersAlone) {
   Program one = join(), other = join();
   command(one, command_stream(0x40)); /* no firmware has it */
   command(other, command_stream(WIRE_STREAM_CONTACT));
@@ -250,8 +250,7 @@ TEST_F(HubTest, ARefusedWishIsItsOwnersAlone) {
   EXPECT_EQ(other.count_of(WIRE_CONTACT), 1u);
 }
 
-TEST_F(HubTest, LossesOfTheLineAreEverybodys) {
-  greet();
+TEST_F(GreetedHubTest, LossesOfTheLineAreEverybodys) {
   Program one = join(), other = join();
   stream(one, BOTH);
   stream(other, WIRE_STREAM_CONTACT);
@@ -273,8 +272,7 @@ TEST_F(HubTest, LossesOfTheLineAreEverybodys) {
   EXPECT_EQ(other.heard.size(), 3u);
 }
 
-TEST_F(HubTest, ARestartLooksAsItDoesOnTheLine) {
-  greet();
+TEST_F(GreetedHubTest, ARestartLooksAsItDoesOnTheLine) {
   Program one = join();
   stream(one, BOTH);
   Decoder direct;
@@ -296,8 +294,7 @@ TEST_F(HubTest, ARestartLooksAsItDoesOnTheLine) {
   EXPECT_GT(direct.statistics().dropped_packets, 1000u);
 }
 
-TEST_F(HubTest, ASlowClientLosesItsOwnPacketsCountedAndNobodyElses) {
-  greet();
+TEST_F(GreetedHubTest, ASlowClientLosesItsOwnPacketsCountedAndNobodyElses) {
   for (std::size_t bytes : {0u, 97u}) { /* it reads with each frame */
     Program slow = join(), quick = join();
     stream(slow, BOTH);
@@ -328,8 +325,7 @@ TEST_F(HubTest, ASlowClientLosesItsOwnPacketsCountedAndNobodyElses) {
   }
 }
 
-TEST_F(HubTest, AStoppedClientBeginsAnewBeforeItsNumbersLie) {
-  greet();
+TEST_F(GreetedHubTest, AStoppedClientBeginsAnewBeforeItsNumbersLie) {
   Program stopped = join();
   stream(stopped, WIRE_STREAM_CONTACT);
   std::uint32_t frames = 0;
@@ -340,8 +336,7 @@ TEST_F(HubTest, AStoppedClientBeginsAnewBeforeItsNumbersLie) {
   EXPECT_GT(hub.lost(stopped.client), Hub::MOST_LOST_IN_A_ROW);
 }
 
-TEST_F(HubTest, HealthOfTheStreamIsNoAnswer) {
-  greet();
+TEST_F(GreetedHubTest, HealthOfTheStreamIsNoAnswer) {
   Program streaming = join(), asking = join();
   stream(streaming, WIRE_STREAM_HEALTH);
   say(test::make_health(0, 1));
@@ -363,8 +358,7 @@ TEST_F(HubTest, HealthOfTheStreamIsNoAnswer) {
   EXPECT_EQ(streaming.count_of(WIRE_HEALTH), 2u);
 }
 
-TEST_F(HubTest, ALostAnswerIsNotTakenForTheNext) {
-  greet();
+TEST_F(GreetedHubTest, ALostAnswerIsNotTakenForTheNext) {
   Program one = join(), other = join();
   command(one, command_info());
   say(test::make_ack(0, 1, WIRE_CMD_INFO, WIRE_RESULT_DONE, command_on_line(WIRE_CMD_INFO).sequence, 0));
@@ -377,8 +371,7 @@ TEST_F(HubTest, ALostAnswerIsNotTakenForTheNext) {
   EXPECT_EQ(other.count_of(WIRE_INFO), 1u);
 }
 
-TEST_F(HubTest, TypesOfALaterFirmwareGoThrough) {
-  greet();
+TEST_F(GreetedHubTest, TypesOfALaterFirmwareGoThrough) {
   Program streaming = join(), idle = join();
   stream(streaming, WIRE_STREAM_CONTACT);
   Bytes later(WIRE_HEADER_BYTES + 5, 0x33);
@@ -433,8 +426,7 @@ TEST_F(HubTest, AnotherVersionIsAskedAndHeardAsItIs) {
   EXPECT_FALSE(hub.take_loader_wish()) << "one that speaks this version";
 }
 
-TEST_F(HubTest, DamageOfAClientDoesNotReachTheLine) {
-  greet();
+TEST_F(GreetedHubTest, DamageOfAClientDoesNotReachTheLine) {
   Program one = join();
   auto bytes = frame_bytes(command_info());
   bytes[5] = static_cast<std::uint8_t>(bytes[5] ^ 0x44);
@@ -448,8 +440,7 @@ TEST_F(HubTest, DamageOfAClientDoesNotReachTheLine) {
   EXPECT_EQ(commands().size(), 1u);
 }
 
-TEST_F(HubTest, ALineThatDoesNotAnswerIsNotFlooded) {
-  greet();
+TEST_F(GreetedHubTest, ALineThatDoesNotAnswerIsNotFlooded) {
   Program one = join();
   std::size_t sent = 0;
   for (; hub.takes_commands(now) && sent < 1000; sent++) {

@@ -1,62 +1,89 @@
-#include "libfingertip/line_source.hpp"
+#include "libfingertip/error.hpp"
 #include "support/host_packets.hpp"
 #include "tool/cli/live_recording.hpp"
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/stat.h>
 
 using namespace fingertip;
+using namespace std::chrono_literals;
 
-/* A pipe of one page is the disk: no one reads it until two seconds are recorded. */
-static void record_while_it_stalls(std::size_t devices, const std::string &name) {
-  constexpr std::uint32_t FRAMES = 2 * 1308;
-  test::TemporaryFolder folder;
-  const std::string path = folder / name;
-  mkfifo(path.c_str(), 0600);
-  const int pipe = open(path.c_str(), O_RDONLY | O_NONBLOCK);
-  fcntl(pipe, F_SETPIPE_SZ, 4096);
-  Wake goes_on;
-  bool went_on = false;
-  std::string written;
-  Thread disk([&] {
-    went_on = goes_on.wait(host_now() + std::chrono::seconds(20));
-    written = test::contents(path);
-  });
-  std::vector<DeviceNews> ready;
-  for (std::size_t i = 0; i < devices; i++) {
-    ready.emplace_back(DeviceNews::Kind::ready, i).packet = test::make_info(0, 0);
-    ready[i].packet.body.info.serial[0] = static_cast<char>('A' + i);
-  }
-  {
-    LiveRecording recording(path, true, ready, "port", 0);
-    for (std::uint32_t frame = 0; frame < FRAMES; frame++) {
-      for (DeviceNews &news : ready) {
-        news.host_us = 1e6 * frame / 1308;
-        news.packet = test::make_raw(0, static_cast<std::uint64_t>(news.host_us), frame);
-        recording.packet(news);
-      }
-      recording.writer().settle(ready[0].host_us);
+struct Disk {
+  std::chrono::milliseconds stall{0};
+  std::string full_at = "-", written;
+};
+
+struct DiskSink : ByteSink {
+  explicit DiskSink(Disk &of) : disk(of) {}
+  void append(const void *bytes, std::size_t length) override {
+    const std::string text(static_cast<const char *>(bytes), length);
+    wait_until(host_now() + std::exchange(disk.stall, 0ms));
+    if (text == disk.full_at) {
+      throw Error("full");
     }
-    goes_on.set();
-    recording.finish(std::vector<LineStatistics>(devices), "stopped");
+    disk.written += text;
   }
-  disk.join();
-  close(pipe);
-  EXPECT_TRUE(went_on) << name << ": recording waits for the disk";
-  const std::string copy = folder / ("copy_" + name);
-  std::ofstream(copy, std::ios::binary) << written;
-  const auto lines = open_lines(copy);
-  std::size_t frames = 0;
-  for (LineSource::Line line; lines->next(line);) {
-    frames += line.text[0] != '#' && line.text.find("frame") == std::string::npos;
+  void finish() override { disk.written += "end"; }
+  const std::string &path() const override { return disk.full_at; }
+
+  Disk &disk;
+};
+
+static void append(QueuedSink &sink, const std::string &text) { sink.append(text.data(), text.size()); }
+
+TEST(QueuedSink, WritesWhatItHasWhenNothingMoreComes) {
+  Disk disk;
+  {
+    QueuedSink sink(std::make_unique<DiskSink>(disk));
+    for (const char *all : {"", "a", "aa"}) {
+      wait_until(host_now() + 20ms);
+      EXPECT_EQ(disk.written, all);
+      append(sink, "a");
+    }
   }
-  EXPECT_EQ(frames, FRAMES * devices) << name;
+  EXPECT_EQ(disk.written, "aaa");
 }
 
-TEST(LiveRecording, NothingOfManyIsLostWhileADiskStallsForTwoSeconds) {
-  for (std::size_t devices : {1, 16}) {
-    record_while_it_stalls(devices, "a.csv");
-    record_while_it_stalls(devices, "a.mcap");
+TEST(QueuedSink, TellsAnErrorEachTimeAndWritesNothingAfterIt) {
+  Disk disk = {0ms, "b", ""};
+  {
+    QueuedSink sink(std::make_unique<DiskSink>(disk));
+    for (const char *text : {"a", "b", "c"}) {
+      append(sink, text);
+    }
+    for (int i = 0; i < 2; i++) {
+      EXPECT_THROW(sink.finish(), Error);
+      EXPECT_THROW(append(sink, "d"), Error);
+    }
+  }
+  EXPECT_EQ(disk.written, "a");
+}
+
+TEST(QueuedSink, AStalledDiskHoldsUpOnlyWhatItHasNoRoomFor) {
+  Disk disk = {2s, "-", ""};
+  QueuedSink sink(std::make_unique<DiskSink>(disk));
+  const std::string second(16 * 1308 * 640, 'x'); /* of sixteen fingertips */
+  const HostTime before = host_now();
+  append(sink, second);
+  wait_until(before + 100ms); /* under way, and not written */
+  for (int i = 0; i < 5; i++) {
+    append(sink, second);
+  }
+  EXPECT_EQ(host_now(), before + 100ms);
+  append(sink, second);
+  EXPECT_GE(host_now(), before + 2s);
+  sink.finish();
+  EXPECT_EQ(disk.written.size(), 7 * second.size() + 3);
+}
+
+TEST(LiveRecording, BeginsOnlyWithItsHeadOnTheDisk) {
+  test::TemporaryFolder folder;
+  std::vector<DeviceNews> ready(1, DeviceNews(DeviceNews::Kind::ready, 0));
+  ready[0].packet = test::make_info(0, 0);
+  for (const char *name : {"a.csv", "a.mcap"}) {
+    LiveRecording recording(folder / name, true, ready, "port", 0);
+    EXPECT_GT(test::contents(folder / name).size(), 800u) << name;
+    const std::string full = folder / ("full_" + std::string(name));
+    ASSERT_EQ(symlink("/dev/full", full.c_str()), 0);
+    EXPECT_THROW(LiveRecording(full, true, ready, "port", 0), Error) << name;
   }
 }

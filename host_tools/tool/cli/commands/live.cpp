@@ -146,7 +146,7 @@ private:
     case Kind::mute: event(news.device, "no answer to the end of the streams"); break;
     case Kind::bytes:
       if (!raw_bytes_) {
-        raw_bytes_ = make_queued_file(options_.raw_bytes, options_.overwrite);
+        raw_bytes_ = std::make_unique<QueuedSink>(options_.raw_bytes, options_.overwrite);
       }
       raw_bytes_->append(news.bytes.data(), news.bytes.size());
       break;
