@@ -181,9 +181,24 @@ class LiveData(CliTest):
         self.assertIn("--raw-bytes needs a file", self.error("record", self.csv, "--raw-bytes", "-", status=2))
         self.assertIn("use `fingertip record -`", self.error("monitor", "--record", "-", status=2))
         with self.device(), open("/dev/full", "w", encoding="ascii") as full:
-            self.assertIn(
-                "fingertip: -: No space left on device", self.run_cli("record", "-", "--port", self.port, status=1, stdout=full)[1]
-            )
+            err = self.run_cli("record", "-", "--port", self.port, status=1, stdout=full)[1]
+            self.assertIn("fingertip: -: No space left on device", err)
+
+    def test_a_full_disk(self):
+        """From the beginning or later: what was written stays readable."""
+        for command, full in (
+            ("record /dev/full", "/dev/full"),
+            (f"record {self.csv} --raw-bytes /dev/full", "/dev/full"),
+            ("monitor --record /dev/full", "/dev/full"),
+            (f"record {self.csv}", self.csv),
+            (f"record - --raw-bytes {self.ftr}", self.ftr),
+        ):
+            with self.device():
+                _, err = self.run_cli(*command.split(), "--overwrite", "--port", self.port, status=1, preexec_fn=limit)
+            why = "No space left on device" if full == "/dev/full" else "File too large"
+            self.assertRegex(err.splitlines()[-1], rf"^fingertip: {full}: {why}; .*(make room and start a new file|--salvage)$")
+        for path in (self.csv, self.ftr):
+            self.assertRegex(self.run_cli("replay", path, "--speed", "max", "--salvage")[0], r" [1-9]\d+ frames in")
 
     def test_a_file_it_is_appended_to_keeps_what_it_had(self):
         pathlib.Path(self.csv).write_text("precious\n", encoding="utf-8")
