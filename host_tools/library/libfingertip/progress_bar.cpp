@@ -21,8 +21,8 @@ void ProgressBar::show(double share) {
   next_ = now + std::chrono::milliseconds(in_place_ ? 200 : 10000);
   const double spent_s = std::chrono::duration<double>(now - begun_).count();
   std::fprintf(stderr, in_place_ ? "\r\x1b[K%s %.0f %%" : "%s %.0f %%", what_.c_str(), 100 * std::clamp(share, 0.0, 1.0));
-  if (spent_s > 2) {
-    std::fprintf(stderr, ", %.0f s left", spent_s * (1 / std::clamp(share, 1e-3, 1.0) - 1));
+  if (spent_s > 2 && share > 0.01) {
+    std::fprintf(stderr, ", %.0f s left", spent_s * (1 / std::min(share, 1.0) - 1));
   }
   std::fputs(in_place_ ? "" : "\n", stderr);
 }

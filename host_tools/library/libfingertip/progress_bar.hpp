@@ -1,4 +1,5 @@
-/* The progress of a long job and the time that is left, on stderr: in place on a terminal, elsewhere a line every ten seconds. */
+/* The progress of a long job and, above 1 %, the time that is left, on stderr: in place on a terminal, elsewhere a line every ten seconds.
+ */
 #pragma once
 
 #include "libfingertip/clock.hpp"

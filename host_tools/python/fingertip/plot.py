@@ -72,7 +72,7 @@ def thinned(recording, rows):
 
 
 def progress():
-    """Shows a share and the time that is left, from the third second on: in place on a terminal, else a line every ten seconds."""
+    """Shows a share and, above 1 %, the time that is left, from the third second on: in place on a terminal, else a line every ten seconds."""
     begun_s = shown_s = host_time.now_s()
 
     def show(share):
@@ -81,7 +81,7 @@ def progress():
         if now_s - begun_s < WORTH_SHOWING_s or now_s - shown_s < (0 if sys.stderr.isatty() else LINES_s):
             return
         shown_s = now_s
-        text = f"reading {100 * share:.0f} %, {(now_s - begun_s) * (1 - share) / max(share, 1e-3):.0f} s left"
+        text = f"reading {100 * share:.0f} %" + (f", {(now_s - begun_s) * (1 / share - 1):.0f} s left" if share > 0.01 else "")
         print(f"\r\x1b[K{text}" if sys.stderr.isatty() else text, end="" if sys.stderr.isatty() else "\n", file=sys.stderr, flush=True)
 
     return show
