@@ -23,7 +23,7 @@ constexpr int FIRST_EXCHANGES = 32;
 constexpr milliseconds EXCHANGE_INTERVAL{100};
 /* How far behind a loop may be with reading, for the others' rows to wait for it. */
 constexpr std::int64_t LONGEST_BACKLOG_us = 2000000;
-/* Of each fingertip: three seconds of 1308 frames of two packets, so that a disk may stall for two. */
+/* Of each fingertip: three seconds of 1308 frames/s of two packets. */
 constexpr std::size_t FEED_CAPACITY = 8000;
 constexpr Session::Policy LAST_WORD = {milliseconds(500), 2};
 

@@ -9,10 +9,8 @@ using Kind = DeviceNews::Kind;
 
 /* Its port is a link in a folder of its own. */
 struct Streamer {
-  explicit Streamer(int rate_Hz = 10000) : fingertip(folder / "tty", "A", rate_Hz, [] { return test::Feel{}; }) {}
-
   test::TemporaryFolder folder;
-  test::SoftFingertip fingertip;
+  test::SoftFingertip fingertip{folder / "tty", "A", 10000, [] { return test::Feel{}; }};
 };
 
 static DeviceLoop::Options streaming() {
