@@ -73,7 +73,8 @@ class Distribution(unittest.TestCase):
         scenario = self.folder / "demo.csv"
         run(clean / "bin/fingertip-scenario", "demo", "-o", scenario, "--seconds", "1", cwd=self.folder)
         self.assertTrue(scenario.read_text(encoding="utf-8").startswith("# fingertip-scenario 1\n"))
-        self.assertIn("usage: fingertip-evaluate", run(clean / "bin/fingertip-evaluate", "--help", cwd=self.folder))
+        for command in ([clean / "bin/fingertip-evaluate"], [clean / "bin/python", "-m", "fingertip", "evaluate"]):
+            self.assertIn("usage: fingertip-evaluate", run(*command, "--help", cwd=self.folder))
         done = subprocess.run(
             [clean / "bin/fingertip-plot", "x.csv", "-o", "x.png"], capture_output=True, text=True, cwd=self.folder, timeout=PATIENCE_s
         )
