@@ -8,10 +8,10 @@
 #include "wire/packet.h"
 
 struct condition_stage {
-  struct condition condition;
-  struct condition_gains gains; /* of the calibration in use */
   bool has_gains;
   bool below; /* in the last frame a sensor was below its zero */
+  struct condition condition;
+  struct condition_gains gains; /* of the calibration in use */
 };
 
 void condition_stage_process(struct condition_stage *own, struct findings *found);

@@ -9,10 +9,10 @@
 #include "fit/fit_gains.h"
 
 struct doubt_stage {
+  bool gains_are_due; /* of this contact, between two searches for a tangential force */
+  uint32_t frame_us;  /* time of the last frame */
   struct fit_doubt force;
   struct fit_gains gains; /* learnt while no calibration is in use */
-  bool gains_are_due;     /* of this contact, between two searches for a tangential force */
-  uint32_t frame_us;      /* time of the last frame */
 };
 
 void doubt_stage_process(const struct doubt_stage *own, const struct location_stage *location, struct findings *found);

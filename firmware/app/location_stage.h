@@ -8,15 +8,15 @@
 #include "wire/packet.h"
 
 struct location_stage {
-  struct fit_array array;
-  struct fit_settings settings;
-  struct fit_own own[FT_MAX_SENSORS]; /* sensor positions and widths of the calibration in use */
-  struct fit_watch watch;             /* search for an outlier among the sensors, of the contact under way */
-  uint32_t frame_us;                  /* time of the last frame */
+  uint32_t frame_us; /* time of the last frame */
   uint32_t failures;
   float prior_sigma_mm, prior_sd_mm;     /* set by the user: width to expect of a contact; sd 0: not set */
   const struct calibration *calibration; /* in use; NULL: none */
   bool has_profile;                      /* a pad's profile is in use */
+  struct fit_array array;
+  struct fit_settings settings;
+  struct fit_own own[FT_MAX_SENSORS]; /* sensor positions and widths of the calibration in use */
+  struct fit_watch watch;             /* search for an outlier among the sensors, of the contact under way */
 };
 
 void location_stage_start(struct location_stage *own);

@@ -13,16 +13,16 @@
 
 struct tangential_stage {
   const struct pad_profile *profile; /* in use; NULL: none */
+  bool is_asked;                     /* and not answered yet */
+  bool is_followed;                  /* the question before was of the same contact and pad */
+  bool waits;                        /* this frame waits for its own answer; else it has that of the frame before */
+  bool is_late;                      /* in this frame */
+  uint64_t asked_us;
+  uint32_t limit_us; /* longest wait after that */
   struct tangential_settings settings;
   struct tangential_history history;
   struct tangential_job job;
-  bool is_asked;    /* and not answered yet */
-  bool is_followed; /* the question before was of the same contact and pad */
-  bool waits;       /* this frame waits for its own answer; else it has that of the frame before */
-  bool is_late;     /* in this frame */
-  uint64_t asked_us;
-  uint32_t limit_us; /* longest wait after that */
-  struct {           /* what the question is about: later frames leave it alone */
+  struct { /* what the question is about: later frames leave it alone */
     int32_t pressure_Pa_q10[FT_MAX_SENSORS];
     struct fit_settings settings;
     struct fit_result fit;

@@ -90,8 +90,6 @@ struct motion_history {
   struct motion_sums now;        /* with the newest frame in them */
   struct motion_moments moments; /* the same */
   struct motion_ratio ratio_x, ratio_y;
-  struct motion_ring brief, slow;                       /* every frame; MOTION_SLOW_STEP_us apart */
-  struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
   uint64_t newest_us;
   uint64_t judged_us, slid_us; /* when last; when a slide showed last */
   struct motion motion;        /* as judged */
@@ -99,8 +97,10 @@ struct motion_history {
   int32_t crosstalk_q8;        /* the same: see motion.c */
   sensor_map used;             /* bitmap: sensors in use */
   bool velocity_valid, moving, sliding;
-  bool stepped;     /* slow has an entry that is not judged yet */
-  bool slow_slides; /* at the newest that is */
+  bool stepped;                                         /* slow has an entry that is not judged yet */
+  bool slow_slides;                                     /* at the newest that is */
+  struct motion_ring brief, slow;                       /* every frame; MOTION_SLOW_STEP_us apart */
+  struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
 };
 
 /* Forgets the past. */

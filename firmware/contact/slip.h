@@ -19,12 +19,12 @@
 #define SLIP_CAPACITY 160
 
 struct slip_history {
-  uint64_t t_us[SLIP_CAPACITY];
-  int32_t x_16th_um[SLIP_CAPACITY], y_16th_um[SLIP_CAPACITY];
   uint16_t oldest, count;  /* ring */
   bool spans;              /* the window has been filled since the last reset or pause */
   int32_t x_sum, y_sum;    /* over the ring */
   sensor_map used, newest; /* bitmaps: settled sensors of the locations, and of the newest frame; contact.c */
+  uint64_t t_us[SLIP_CAPACITY];
+  int32_t x_16th_um[SLIP_CAPACITY], y_16th_um[SLIP_CAPACITY];
 };
 
 /* Forgets the past: call when contact is lost or the location cannot be trusted. */

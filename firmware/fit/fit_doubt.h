@@ -27,18 +27,18 @@
 
 /* A look under way. Errors of readings are in sixteenths of the unit that the readings have. */
 struct fit_doubt_search {
-  int count;                                                  /* of its sensors */
-  int32_t row[FIT_DOUBT_SENSORS_MAX][FIT_DOUBT_UNKNOWNS + 1]; /* weighted; the last: the residual */
-  uint32_t size[FIT_DOUBT_UNKNOWNS + 1];                      /* the highest bit: a column's largest */
-  int8_t q[FIT_DOUBT_UNKNOWNS + 1];                           /* value = integer 2^-q */
-  int8_t up[FIT_DOUBT_UNKNOWNS];                              /* of q, what the equations have more */
-  int32_t base_q4;                                            /* error of a reading of weight 1 */
-  struct scaled base;                                         /* the same, of p0 */
-  int32_t dip_q18;                                            /* of p0 */
-  int32_t dip_per_q26;                                        /* sigma^2 over the dip's sd^2 */
-  int32_t matrix[FIT_DOUBT_UNKNOWNS][FIT_DOUBT_UNKNOWNS];     /* lower half of the normal matrix */
+  int count;                             /* of its sensors */
+  uint32_t size[FIT_DOUBT_UNKNOWNS + 1]; /* the highest bit: a column's largest */
+  int8_t q[FIT_DOUBT_UNKNOWNS + 1];      /* value = integer 2^-q */
+  int8_t up[FIT_DOUBT_UNKNOWNS];         /* of q, what the equations have more */
+  int32_t base_q4;                       /* error of a reading of weight 1 */
+  struct scaled base;                    /* the same, of p0 */
+  int32_t dip_q18;                       /* of p0 */
+  int32_t dip_per_q26;                   /* sigma^2 over the dip's sd^2 */
   int32_t right[FIT_DOUBT_UNKNOWNS];
   int32_t residual_square;
+  int32_t row[FIT_DOUBT_SENSORS_MAX][FIT_DOUBT_UNKNOWNS + 1]; /* weighted; the last: the residual */
+  int32_t matrix[FIT_DOUBT_UNKNOWNS][FIT_DOUBT_UNKNOWNS];     /* lower half of the normal matrix */
 };
 
 /* Of one contact, from frame to frame. All zeros are as fit_doubt_begin leaves it. */

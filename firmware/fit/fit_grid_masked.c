@@ -54,7 +54,6 @@ struct node {
 /* The columns and the polynomials behind them. The polynomials are those that were orthogonal under the previous iterate, about the present
  * mean; what is missing to be orthogonal under the present one is small, and the factors below take it out of the right-hand side. */
 struct columns {
-  struct node node[MOST_NODES];
   bool dip;
   int32_t narrowness_q12;      /* sigma^2 over that of the dip */
   int32_t centre_x, centre_y;  /* LINEAR_Q */
@@ -64,10 +63,11 @@ struct columns {
   int32_t cross;               /* p2 = dy - cross dx */
   int32_t skew_x, skew_y;      /* p3 = dx^2 + dy^2 - variance - skew_x dx - skew_y dy */
   int32_t variance;
-  int32_t mass;                /* sum of (e - d)^2, Q(30 - MASS_SHIFT) */
-  int32_t product_q26;         /* sum of e - d times the reading */
-  int32_t norm1, norm2, norm3; /* value = integer * 2^(NORM_SHIFT - 2 q) */
-  int32_t f21, f31, f32;       /* L of L D L^T, Q12 in the units of the columns */
+  int32_t mass;                 /* sum of (e - d)^2, Q(30 - MASS_SHIFT) */
+  int32_t product_q26;          /* sum of e - d times the reading */
+  int32_t norm1, norm2, norm3;  /* value = integer * 2^(NORM_SHIFT - 2 q) */
+  int32_t f21, f31, f32;        /* L of L D L^T, Q12 in the units of the columns */
+  struct node node[MOST_NODES]; /* last: what is before is within reach of a short instruction */
 };
 
 /* Added to the norms: what it is in units of a column of the finest scale that is allowed. */
@@ -470,8 +470,9 @@ static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
   return (power << 22) + fit_grid_rise(at->height, offset_x, offset_y);
 }
 
-#define DEPTH_MAX_Q28 (1 << 26) /* of the strongest node, which is from a quarter to one */
-#define SHAPE_LEAST_Q16 ((uint32_t)(FIT_SHAPE_LEAST * 65536.0f))
+#define DEPTH_MAX_Q28 (1 << 26)                                      /* of the strongest node, which is from a quarter to one */
+#define IN_ORDER(exponent, mantissa) ((exponent)*65536 + (mantissa)) /* of a positive struct scaled */
+#define SHAPE_LEAST IN_ORDER(-15, (int32_t)(FIT_SHAPE_LEAST * 32768.0f))
 #define DIP_END_Q15 ((int32_t)(FIT_DIP_END * 32768.0f))
 #define NARROWNESS_MAX_Q12 (1 << 11) /* a dip is wider than its contact */
 
@@ -501,8 +502,8 @@ static NOINLINE void set_dip(const struct readings *readings, const struct fit_s
   c->narrowness_q12 = narrowness < NARROWNESS_MAX_Q12 ? narrowness : NARROWNESS_MAX_Q12;
   struct dip dip;
   int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, 1 << 28, system->rise_q22, DEPTH_MAX_Q28, &dip);
-  const uint32_t known_q16 = (uint32_t)fit_scaled_to_fixed(readings->prior_sigma, 16); /* 0: it is not */
-  if (known_q16 - 1u < SHAPE_LEAST_Q16 - 1u) {
+  const struct scaled *known = &readings->prior_sigma;
+  if (IN_ORDER(known->exponent, known->mantissa) < SHAPE_LEAST) { /* not known: 0 */
     if (COLUMNS > 2) {
       take_end(dip.x, COLUMNS - 1, at->x);
     }
@@ -510,9 +511,12 @@ static NOINLINE void set_dip(const struct readings *readings, const struct fit_s
       take_end(dip.y, ROWS - 1, at->y);
     }
   }
-  for (int k = 0; k < NODES; k++) {
-    int32_t along = fixed_mul_q30(depth_q28 * 4, dip.x[k / ROWS]);
-    c->node[k].d = readings->residual[k] == 0 ? fixed_mul_q30(along, dip.y[k % ROWS]) : 0;
+  struct node *node = c->node;
+  for (int i = 0; i < COLUMNS; i++) {
+    int32_t along = fixed_mul_q30(depth_q28 * 4, dip.x[i]);
+    for (int j = 0; j < ROWS; j++, node++) {
+      node->d = readings->residual[node - c->node] == 0 ? fixed_mul_q30(along, dip.y[j]) : 0;
+    }
   }
 }
 

@@ -45,15 +45,15 @@ static inline void fit_use_rectangle(const struct fit_grid_shape *grid) {
 /* The pressures of one frame in grid order [column][row], the largest from 0.5 to 1; where there is
  * a dip, half of that, so that what it takes finds room. */
 struct readings {
-  int32_t q28[MOST_NODES], q14[MOST_NODES];
-  int32_t residual[MOST_NODES]; /* room for the kernel */
-  int32_t shift;                /* Q28 = 1/1024 Pa times 2^shift */
-  int32_t largest;              /* 1/1024 Pa */
+  int32_t shift;   /* Q28 = 1/1024 Pa times 2^shift */
+  int32_t largest; /* 1/1024 Pa */
   int32_t largest_q28;
   struct scaled prior_sigma, prior_weight; /* pitches, per pitch; weight 0: none */
   struct scaled prior_sd;                  /* of its row, in units of q28 */
   struct scaled dip_share;                 /* 0: none */
   int32_t dip_height;                      /* Q26, of the dip's Gaussian */
+  int32_t q28[MOST_NODES], q14[MOST_NODES];
+  int32_t residual[MOST_NODES]; /* room for the kernel */
 };
 
 struct state {

@@ -58,9 +58,6 @@
 
 struct readings {
   bool presses_are_shared; /* see scan_settings */
-  struct ms58xx_thermal thermal[FT_MAX_SENSORS];
-  int16_t doubted_cC[FT_MAX_SENSORS];     /* [sensor] the temperature that was not used */
-  int32_t last_Pa_q10[2][FT_MAX_SENSORS]; /* [newest][sensor] the last that counted */
   uint8_t newest;
   uint64_t t_us;          /* of the last frame */
   int16_t temperature_cC; /* mean of the sensors admitted, the last one if there is none */
@@ -89,6 +86,9 @@ struct readings {
   sensor_map alike;        /* bitmap: has read the others' temperature since it came */
   sensor_map was_alike;    /* bitmap: at the last temperature */
   sensor_map apart;        /* bitmap: see readings_doubt() */
+  struct ms58xx_thermal thermal[FT_MAX_SENSORS];
+  int16_t doubted_cC[FT_MAX_SENSORS];     /* [sensor] the temperature that was not used */
+  int32_t last_Pa_q10[2][FT_MAX_SENSORS]; /* [newest][sensor] the last that counted */
 };
 
 /* What a conversion of the temperature brought. */

@@ -119,9 +119,8 @@ struct scan {
   /* Event context only. */
   enum scan_state state;
   bool operation_running;
-  bool bus_stuck;                        /* the last recovery did not free the bus */
-  struct scan_conversion conversions[2]; /* under way, and the one before, whose codes are in result */
-  struct scan_conversion *conversion;    /* under way */
+  bool bus_stuck;                     /* the last recovery did not free the bus */
+  struct scan_conversion *conversion; /* under way */
   bool last_was_temperature;
   uint32_t overhead_us; /* of a conversion: command and reading */
   uint64_t wait_until_us;
@@ -136,15 +135,6 @@ struct scan {
   sensor_map missed_once;  /* bitmap: the last reading was not acknowledged, ... */
   sensor_map missed_twice; /* ... nor the one before */
   sensor_map returned;     /* bitmap: admitted, and was not before */
-  struct array_bus_result result;
-
-  /* Written by the event context while the slot of its kind is not claimed, read by the main
-   * context while it is. A temperature is never overwritten, and while it waits no PROM changes. */
-  struct scan_slot slot;
-  _Atomic uint32_t slot_state; /* enum scan_slot_state */
-  struct scan_slot temperature_slot;
-  _Atomic uint32_t temperature_state;
-  struct bring_up bring_up; /* of which the main context reads prom */
 
   /* Written by the event context, readable from any. */
   _Atomic sensor_map present;  /* bitmap: acknowledged at the last attempt */
@@ -152,6 +142,17 @@ struct scan {
   _Atomic uint32_t rests;      /* as it must: nothing is under way on the bus */
   _Atomic sensor_map prom_bad; /* bitmap: after all attempts its CRC differs, or it is blank */
   struct scan_counters counters;
+
+  /* Written by the event context while the slot of its kind is not claimed, read by the main
+   * context while it is. A temperature is never overwritten, and while it waits no PROM changes. */
+  _Atomic uint32_t slot_state, temperature_state; /* enum scan_slot_state */
+  struct scan_slot slot;
+  struct scan_slot temperature_slot;
+  struct bring_up bring_up; /* of which the main context reads prom */
+
+  /* Event context only. */
+  struct scan_conversion conversions[2]; /* under way, and the one before, whose codes are in result */
+  struct array_bus_result result;
 
   /* Main context only. */
   uint64_t temperature_us; /* of the last one used */

@@ -52,9 +52,9 @@ enum ft_status wire_decode(const struct wire_layout *const *set, uint8_t *frame,
 /* Collects bytes from a line into packets. Resynchronisation: whatever happened, the next frame begins after the next 0x00. */
 struct wire_receiver {
   const struct wire_layout *const *set;
-  uint8_t frame[WIRE_MAX_FRAME_BYTES];
   size_t length;
   uint32_t overlong; /* 1 while skipping a frame that is longer than any valid one */
+  uint8_t frame[WIRE_MAX_FRAME_BYTES];
 };
 
 void wire_receiver_init(struct wire_receiver *receiver, const struct wire_layout *const *set);
