@@ -20,7 +20,7 @@ namespace {
 
 constexpr double M = 1e-3;                    // m per mm
 constexpr double CONTACT_s = 1e-3;            // time constant of a contact's normal force
-constexpr double GYRATION = 0.6;              // radius of, per half of the mean size
+constexpr double INERTIA = 0.25;              // per mass and half sizes squared: box 1/3, cylinder 1/4, ball 1/5
 constexpr double LOSS_s = 5e-4;               // of the rubber's normal spring
 constexpr double FREE_N_mm = 1.0;             // brings a free face back to its finger
 constexpr double JUMPS_mm = 5.0;              // a finger that is so far off was put there
@@ -29,9 +29,10 @@ constexpr double SPIN = 3.0 * M_PI / 16.0;    // torque that spins a Hertz conta
 constexpr double FILTER_s = 1e-3;             // of a slide's speed
 // Mean distance from the middle of a line or an area that is pressed evenly, over that of the ends or corners that MuJoCo has.
 constexpr double EVENLY = 0.5;
-// About the normal: a Hertz contact's stiffness (Mindlin), over that along the patch times the arm's square. The edge of the contact slips
-// with every turn, so that nothing rings; the time constant is assumed.
-constexpr double TWIST = 1.4, TWIST_LOSS_s = 0.05;
+// Stiffness about the normal, over that along the patch times the arm's square: of a patch pressed evenly and of a Hertz contact of rubber
+// (Mindlin). The edge of a Hertz contact slips with every turn, so that nothing rings; its time constant is assumed.
+constexpr double TWIST_EVEN = 1.4, TWIST_HERTZ = 2.9, TWIST_LOSS_s = 0.05;
+constexpr double STABLE = 0.25;      // of what a step would take from the object's speed
 constexpr double LEAST_SHARE = 0.02; // of the force: a point with less is not part of the patch
 constexpr int MOTIONS = 8;           // six of the object, and each face along its normal
 constexpr double PAD_mm = 6.0, TABLE_ROLLS = 10.0, AWAY_m = 10.0, APART_mm = 200.0;
@@ -60,7 +61,7 @@ Size size_of(const KindOfGrasp &grasp) {
 
 std::string xml_of(const KindOfGrasp &grasp) {
   const Size size = size_of(grasp);
-  const double gyration_mm = GYRATION * std::cbrt(size.x_mm * size.y_mm * size.z_mm);
+  const double x2 = size.x_mm * size.x_mm, y2 = size.y_mm * size.y_mm, z2 = size.z_mm * size.z_mm;
   const double turn = std::atan2(-std::cos(grasp.down_rad), -std::sin(grasp.down_rad));
   const double c = std::cos(turn), s = std::sin(turn);
   const double level_mm = c * grasp.place_mm.x - s * grasp.place_mm.y;
@@ -68,14 +69,14 @@ std::string xml_of(const KindOfGrasp &grasp) {
   std::ostringstream xml;
   xml.precision(12);
   xml << "<mujoco><option timestep='" << Cell::STEP_s
-      << "' integrator='implicitfast' cone='elliptic'><flag multiccd='enable' island='disable' autoreset='disable'/></option><default>"
+      << "' cone='elliptic'><flag multiccd='enable' island='disable' autoreset='disable'/></option><default>"
          "<geom contype='0' conaffinity='0'/><pair solref='"
       << CONTACT_s << " 1' solimp='.95 .99 .0002'/></default><worldbody><geom name='table' type='plane' size='1 1 .1' pos='0 0 "
       << -M * size.z_mm << "'/>"
       << "<body name='object' pos='" << M * grasp.off_mm << " 0 0'><freejoint/><inertial pos='0 " << M * grasp.com_mm.x << " "
       << M * grasp.com_mm.y << "' mass='" << grasp.mass_kg << "' diaginertia='";
-  for (int i = 0; i < 3; i++) {
-    xml << grasp.mass_kg * M * M * gyration_mm * gyration_mm << " ";
+  for (const double mm2 : {y2 + z2, x2 + z2, x2 + y2}) {
+    xml << grasp.mass_kg * INERTIA * M * M * mm2 << " ";
   }
   xml << "'/><geom name='thing' type='" << size.geom << "' size='" << M * size.x_mm << " ";
   if (std::string(size.geom) == "cylinder") {
@@ -94,7 +95,7 @@ std::string xml_of(const KindOfGrasp &grasp) {
   xml << "</worldbody><contact><pair geom1='thing' geom2='table' condim='6' friction='" << grasp.table_friction << " "
       << grasp.table_friction << " .001 " << M * TABLE_ROLLS << " " << M * TABLE_ROLLS << "'/>";
   for (const int side : {0, 1}) {
-    xml << "<pair name='pair" << side << "' geom1='thing' geom2='face" << side << "' condim='1'/>";
+    xml << "<pair geom1='thing' geom2='face" << side << "' condim='1'/>";
   }
   xml << "</contact></mujoco>";
   return xml.str();
@@ -206,8 +207,18 @@ struct Cell::World {
       slide_m_s = {speed[1], speed[2], pad.arm_m * spin[0]};
       const double along_N_m = grasp.shear_N_mm / M * std::cbrt(std::max(pad.force_N, 0.05) / AT_N), along = grasp.rubber_N_s_mm / M;
       const double edge = std::pow(twist_arm_m(pad.force_N) / pad.arm_m, 2);
-      const std::array<double, 3> shear_N_m = {along_N_m, along_N_m, TWIST * along_N_m};
-      const std::array<double, 3> damping = {along, along, along + edge * TWIST_LOSS_s * along_N_m};
+      std::array<double, 3> shear_N_m = {along_N_m, along_N_m, (TWIST_EVEN + edge * (TWIST_HERTZ - TWIST_EVEN)) * along_N_m};
+      std::array<double, 3> damping = {along, along, along + edge * TWIST_LOSS_s * along_N_m};
+      // Not stiffer than the steps of a light object can follow.
+      const mjtNum *centre_m = &data->xipos[3 * object];
+      const double inertia_kg_m2 = model->body_inertia[3 * object];
+      const double apart2_m2 = std::pow(pad.middle_m[1] - centre_m[1], 2) + std::pow(pad.middle_m[2] - centre_m[2], 2);
+      const double moved_kg = 1.0 / (1.0 / model->body_mass[object] + apart2_m2 / inertia_kg_m2);
+      for (std::size_t k = 0; k < 3; k++) {
+        const double most = STABLE * (k < 2 ? moved_kg : inertia_kg_m2 / (pad.arm_m * pad.arm_m)) / STEP_s;
+        shear_N_m[k] = std::min(shear_N_m[k], most / STEP_s);
+        damping[k] = std::min(damping[k], most);
+      }
       const double most_N = pad.friction * pad.force_N;
       const auto limit = [&] { mju_scl3(pull_N.data(), pull_N.data(), std::min(1.0, most_N / std::max(mju_norm3(pull_N.data()), 1e-9))); };
       for (std::size_t k = 0; k < 3; k++) {
@@ -258,7 +269,7 @@ struct Cell::World {
     for (const Point &point : pad.points) {
       apart_m += point.force_N / sum_N * std::hypot(point.level_m - level_m, point.up_m - up_m);
     }
-    pad.arm_m = twist_arm_m(pad.force_N) + EVENLY * apart_m;
+    pad.arm_m = std::hypot(twist_arm_m(pad.force_N), EVENLY * apart_m);
   }
 
   void step(double width_mm, const KindOfGrasp::Inputs &inputs) {

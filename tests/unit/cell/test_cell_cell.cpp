@@ -190,3 +190,35 @@ TEST(Cell, AWeightBesideTheAxisTurnsABallAndLessABox) {
   EXPECT_GT(std::abs(turned[0]), 0.5);
   EXPECT_LT(std::abs(turned[1]), 0.1);
 }
+
+TEST(Cell, ABoxTurnsBeyondTheTorqueOfItsArea) {
+  for (const double share : {0.9, 1.1}) {
+    constexpr double FRICTION = 0.5, MEAN_mm = 17.4,
+                     BESIDE_mm = 60.0; // from the middle of the faces: their area, 36 by 54 mm, and the weight
+    KindOfGrasp grasp = held(Shape::box, 0.01, FRICTION);
+    grasp.height_mm = grasp.depth_mm = 200.0;
+    grasp.com_mm = {BESIDE_mm, 0.0};
+    Cell cell(grasp);
+    run(cell, grasp, width_mm(grasp, 10.0), 2.5, [&](double t_s, Inputs &now) {
+      const double most_N = 2.0 * FRICTION * cell.mean_N() / std::hypot(1.0, BESIDE_mm / MEAN_mm);
+      now.table = false;
+      now.mass_kg = std::max(now.mass_kg, share * most_N / GRAVITY_m_s2 * std::min(1.0, t_s / 2.0));
+    });
+    EXPECT_EQ(std::abs(cell.turned_rad()) > 0.4, share > 1.0) << share << ": " << cell.turned_rad();
+  }
+}
+
+TEST(Cell, LightObjectsRestInAFirmGrip) {
+  for (const Shape shape : {Shape::plate, Shape::ball}) {
+    KindOfGrasp grasp = held(shape, shape == Shape::ball ? 0.005 : 0.02, 0.8);
+    grasp.width_mm = shape == Shape::ball ? 10.0 : 4.0;
+    grasp.shear_N_mm = 18.0;
+    Cell cell(grasp);
+    run(cell, grasp, width_mm(grasp, 20.0), 0.5);
+    const double turned_rad = cell.turned_rad();
+    const Vector way_mm = cell.way_mm();
+    run(cell, grasp, width_mm(grasp, 20.0), 0.01);
+    EXPECT_NEAR(cell.turned_rad(), turned_rad, 1e-4) << name_of(shape);
+    EXPECT_NEAR(cell.way_mm().y, way_mm.y, 1e-3) << name_of(shape);
+  }
+}
