@@ -14,7 +14,6 @@ import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "boards/drawing"), str(ROOT / "tests/support")]
-import draw  # noqa: E402
 import figures as figures_file  # noqa: E402
 import geometry  # noqa: E402
 import pcb_check  # noqa: E402
@@ -195,7 +194,6 @@ class Copper(unittest.TestCase):
         self.assertEqual([fabricate.main([folder]) for folder in (one, two)], [0, 0])
         boards, errors = {bus: pcb_check.Board(text) for bus, text in TEXTS.items()}, errors_of_boards()
         differ = [path for path in one.rglob("*.*") if path.read_bytes() != (two / path.relative_to(one)).read_bytes()]
-        differ += [path for path, text in draw.laid(ROOT).items() if path.read_text(encoding="utf-8") != text]
         figures = {key: sum(board[key] for board in right) for key in right[0]} | {
             "boards": len(FOLDERS),
             "netlist_errors": len(errors),
