@@ -41,7 +41,7 @@ enum Stream : std::uint64_t { LINE = 841, PAD = 842 };
 
 constexpr const char *FACE = "sphere15";
 constexpr double FRICTION = 0.65;  // static, before it falls
-constexpr double SLICE_s = 500e-6; // lockstep.mjs, by default
+constexpr double SLICE_s = 500e-6; // of lockstep.mjs
 constexpr std::uint64_t SEED = 1;  // of pads and of the gripper's line
 constexpr int CLOCK_EXCHANGES = 8;
 constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;

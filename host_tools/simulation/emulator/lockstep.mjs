@@ -10,14 +10,13 @@ import { restOf } from './scenario.mjs';
 
 const USAGE = `usage: lockstep.mjs --image FILE.bin --board NAME [options] -- PROGRAM [ARGUMENT...]
 
-Runs emulated boards with the same firmware image and a program in slices of emulated time, each waiting for the other:
+Runs emulated boards with the same firmware image and a program in slices of 500 us of emulated time, each waiting for the other:
 the same bit for bit each time, whatever the wall clock. The ports of the boards are open from the start.
 
   --image FILE       raw flash image (.bin), loaded at flash offset 0
   --board NAME       ${BOARDS.join(' or ')}
   --boards N         number of boards, 1 to 8; default 2
   --clock-ppm LIST   how fast the clock of each is, split by commas; default 0
-  --slice-us N       length of a slice, 100 to 10000; default 500
   --seconds N        the program must be done by then, emulated; default 10
   --seed N           noise, sensor tolerances, SRAM content at power-on of the first board, one more for each further; default 1
 
@@ -29,7 +28,8 @@ writes from there on is a JSON object, which goes to the standard output with wh
 
 Exit: 0 clean; 1 a warning or failure of firmware or emulation; 2 wrong usage or input, or a program that failed.`;
 
-const DEFAULTS = { boards: '2', 'clock-ppm': '0', 'slice-us': '500', seconds: '10', seed: '1' };
+const DEFAULTS = { boards: '2', 'clock-ppm': '0', seconds: '10', seed: '1' };
+const SLICE_NS = 500_000;
 const PRESSURE_LIMIT_Pa = 1e7;
 /** No client sends more within a slice. */
 const SENT_LIMIT = 65536;
@@ -47,7 +47,6 @@ function parseOptions(values, program) {
     board: values.board,
     boards,
     program,
-    slice_ns: 1000 * whole('slice-us', 100, 10000),
     seed: whole('seed', 0, 2 ** 32 - 16),
     end_ns: 1e9 * numberOf('seconds', values.seconds, isPositive, 'a positive number of seconds'),
     clocks_ppm: Array.from({ length: boards }, (_, i) => listed[i] ?? 0),
@@ -132,7 +131,7 @@ class World {
   }
 }
 
-async function run({ image: imagePath, board, boards, program, slice_ns, seed, end_ns, clocks_ppm }) {
+async function run({ image: imagePath, board, boards, program, seed, end_ns, clocks_ppm }) {
   const Board = findBoard(board);
   const image = readImage(imagePath);
   let chunks = [];
@@ -156,16 +155,16 @@ async function run({ image: imagePath, board, boards, program, slice_ns, seed, e
   let result;
   try {
     for (let slice = 0; ; slice++) {
-      world.send(slice * slice_ns, chunks);
+      world.send(slice * SLICE_NS, chunks);
       chunks = [];
       const answers = await world.answer(boards, Board.sensors);
       if (!answers) break;
-      if (slice * slice_ns >= end_ns) throw new InputError(`${world.name}: is not over after ${end_ns / 1e9} s`);
+      if (slice * SLICE_NS >= end_ns) throw new InputError(`${world.name}: is not over after ${end_ns / 1e9} s`);
       answers.forEach(({ pressures_Pa, bytes }, i) => {
-        live[i].add(((slice + 1) * slice_ns) / 1e9, pressures_Pa);
+        live[i].add(((slice + 1) * SLICE_NS) / 1e9, pressures_Pa);
         if (bytes.length) machines[i].client.write(bytes);
       });
-      const stopped = machines.findIndex((machine) => !machine.run((slice + 1) * slice_ns));
+      const stopped = machines.findIndex((machine) => !machine.run((slice + 1) * SLICE_NS));
       if (stopped >= 0)
         throw new InputError(`board ${stopped} ended after ${machines[stopped].result.emulated_s} s: ${machines[stopped].endReason}`);
     }
@@ -182,7 +181,7 @@ async function run({ image: imagePath, board, boards, program, slice_ns, seed, e
     image_sha256,
   }));
   process.stdout.write(
-    `${JSON.stringify({ ...result, slice_us: slice_ns / 1e3, boards: summary, wall_s: (performance.now() - started_ms) / 1e3 }, null, 1)}\n`,
+    `${JSON.stringify({ ...result, slice_us: SLICE_NS / 1e3, boards: summary, wall_s: (performance.now() - started_ms) / 1e3 }, null, 1)}\n`,
   );
   for (const [i, { warnings }] of ran.entries()) for (const line of warnings) process.stderr.write(`board ${i}: ${line}\n`);
   return ran.every(({ warnings }) => warnings.length === 0) ? 0 : 1;
