@@ -73,7 +73,7 @@ public:
 
 struct GripperWay {
   std::string model = {}; // one of gripper_models()
-  std::string port = {};  // of a serial line
+  std::string port = {};  // of a serial line; of a Robotiq on a UR arm: "ur:HOST" (robotiq_urcap.hpp)
   int slave = 0;          // 0: the model's usual
   // Positions that the gripper reports when its pads touch and when it is open; empty: the model's
   // defaults. Of a Robotiq 0 to 255, of a servo 0 to 4095, which may turn either way.

@@ -1,5 +1,5 @@
 #include "grasp/gripper/feetech.hpp"
-#include "grasp/gripper/robotiq.hpp"
+#include "grasp/gripper/robotiq_urcap.hpp"
 #include "libfingertip/text.hpp"
 
 namespace fingertip {
@@ -14,6 +14,10 @@ struct Model {
 
 template <typename Driver> std::unique_ptr<Gripper> driven_by(const GripperWay &way) { return std::make_unique<Driver>(way); }
 
+std::unique_ptr<Gripper> open_robotiq(const GripperWay &way) {
+  return RobotiqUrcap::has(way.port) ? driven_by<RobotiqUrcap>(way) : driven_by<RobotiqGripper>(way);
+}
+
 struct Range {
   double low, high;
 };
@@ -21,7 +25,7 @@ struct Range {
 Model robotiq_traits(const char *model, double stroke_mm, double deadband_mm, Range speed_mm_s, Range force_N) {
   constexpr double LATENCY_s = 0.025, POLL_s = 0.005;
   return {{{stroke_mm, stroke_mm / 227, deadband_mm, speed_mm_s.low, speed_mm_s.high, force_N.low, force_N.high, LATENCY_s, POLL_s}, model},
-          driven_by<RobotiqGripper>};
+          open_robotiq};
 }
 
 /* Strokes, speeds and forces: Robotiq, "2F-85 & 2F-140 Instruction Manual" and "Hand-E Instruction Manual", section

@@ -57,12 +57,11 @@ static void put_values(Bytes *to, const std::array<std::uint16_t, REGISTERS> &va
 // Length of the answer to a read: the count of bytes, and the registers.
 static std::size_t answer_length(int count) { return 1 + 2 * static_cast<std::size_t>(count); }
 
-static std::uint16_t share(double value, double least, double most) {
-  const double clamped = std::clamp(value, least, most);
-  return static_cast<std::uint16_t>(std::lround((clamped - least) / (most - least) * 255.0));
+static int share(double value, double least, double most) {
+  return static_cast<int>(std::lround((std::clamp(value, least, most) - least) / (most - least) * 255.0));
 }
 
-static GripperWay robotiq_way(const GripperWay &given) {
+GripperWay robotiq::complete_way(const GripperWay &given) {
   const GripperWay way = complete(given, USUAL);
   if (way.open_count > way.closed_count) {
     throw Error(ErrorCode::bad_value, "the count of a Robotiq gripper grows while it closes");
@@ -70,8 +69,41 @@ static GripperWay robotiq_way(const GripperWay &given) {
   return way;
 }
 
-RobotiqGripper::RobotiqGripper(const GripperWay &given) : AskedLine(robotiq_way(given), BAUD, gripper_traits(given.model)) {
-  traits_.step_mm = traits_.stroke_mm / (*way_.closed_count - *way_.open_count);
+double robotiq::step_mm(const GripperWay &complete, const GripperTraits &traits) {
+  return traits.stroke_mm / (*complete.closed_count - *complete.open_count);
+}
+
+Request robotiq::request_of(const GripperMove &move, const GripperWay &complete, const GripperTraits &traits) {
+  check_move(move);
+  // At an end all that there is: its count differs from one gripper to the next.
+  const int count = move.width_mm <= 0 ? 255
+                    : move.width_mm >= traits.stroke_mm
+                        ? 0
+                        : static_cast<int>(std::lround(*complete.closed_count - move.width_mm / traits.step_mm));
+  return {count, share(move.speed_mm_s, traits.speed_min_mm_s, traits.speed_max_mm_s),
+          share(move.force_N, traits.force_min_N, traits.force_max_N)};
+}
+
+GripperStatus robotiq::status_of(const Answer &answer, std::int64_t asked_us, const GripperWay &complete, const GripperTraits &traits) {
+  GripperStatus status;
+  status.host_us = (asked_us + steady_now_us()) / 2;
+  status.active = answer.active;
+  status.moving = answer.gsta == ACTIVATING || (answer.active && answer.goes && answer.gobj == IN_MOTION);
+  if (answer.active && answer.goes && answer.gobj != IN_MOTION) {
+    status.object = answer.gobj != AT_REQUEST;
+  }
+  status.width_mm = std::clamp((*complete.closed_count - answer.gpo) * traits.step_mm, 0.0, traits.stroke_mm);
+  status.fault = static_cast<std::uint8_t>(answer.gflt & 0xF);
+  // Whose answer it is proves that it is over.
+  if (status.fault == NO_COMMUNICATION) {
+    status.fault = NO_FAULT;
+    status.was_left_alone = true;
+  }
+  return status;
+}
+
+RobotiqGripper::RobotiqGripper(const GripperWay &given) : AskedLine(complete_way(given), BAUD, gripper_traits(given.model)) {
+  traits_.step_mm = step_mm(way_, traits_);
   std::optional<Error> garbled;
   for (const int function : {4, 3}) {
     read_function_ = function;
@@ -150,22 +182,8 @@ GripperStatus RobotiqGripper::status_of(const Registers &registers) {
   const int gsta = registers[0] >> gSTA_SHIFT & 3, gobj = registers[0] >> gOBJ_SHIFT & 3;
   goes_ = (registers[0] & gGTO) != 0;
   active_ = (registers[0] & gACT) != 0 && gsta == ACTIVATED;
-  GripperStatus status;
-  status.host_us = (asked_us_ + steady_now_us()) / 2;
-  status.active = active_;
-  status.moving = gsta == ACTIVATING || (active_ && goes_ && gobj == IN_MOTION);
-  if (active_ && goes_ && gobj != IN_MOTION) {
-    status.object = gobj != AT_REQUEST;
-  }
-  const int count = registers[2] >> 8;
-  status.width_mm = std::clamp((*way_.closed_count - count) * traits_.step_mm, 0.0, traits_.stroke_mm);
+  GripperStatus status = robotiq::status_of({active_, goes_, gsta, gobj, registers[2] >> 8, registers[1] >> 8}, asked_us_, way_, traits_);
   status.current_A = (registers[2] & 0xFF) * AMPERE_PER_COUNT;
-  status.fault = static_cast<std::uint8_t>(registers[1] >> 8 & 0xF);
-  // Whose answer it is proves that it is over.
-  if (status.fault == NO_COMMUNICATION) {
-    status.fault = NO_FAULT;
-    status.was_left_alone = true;
-  }
   return status;
 }
 
@@ -196,15 +214,9 @@ void RobotiqGripper::activate() {
 }
 
 GripperStatus RobotiqGripper::move(const GripperMove &move) {
-  check_move(move);
-  // At an end all that there is: its count differs from one gripper to the next.
-  const int count = move.width_mm <= 0 ? 255
-                    : move.width_mm >= traits_.stroke_mm
-                        ? 0
-                        : static_cast<int>(std::lround(*way_.closed_count - move.width_mm / traits_.step_mm));
-  const Registers command = {rACT | rGTO, static_cast<std::uint16_t>(count),
-                             static_cast<std::uint16_t>(share(move.speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s) << 8 |
-                                                        share(move.force_N, traits_.force_min_N, traits_.force_max_N))};
+  const Request request = request_of(move, way_, traits_);
+  const Registers command = {rACT | rGTO, static_cast<std::uint16_t>(request.position),
+                             static_cast<std::uint16_t>(request.speed << 8 | request.force)};
   if (!goes_) {
     const GripperStatus now = poll();
     if (!active_) {
@@ -242,7 +254,7 @@ std::string RobotiqGripper::line() const {
          (both_at_once_ ? "23" : "16 and " + std::to_string(read_function_)) + limited_by(both_at_once_ ? 1 : 2);
 }
 
-std::string RobotiqGripper::fault_text(std::uint8_t fault) const {
+std::string robotiq::fault_text(std::uint8_t fault) {
   static const std::pair<std::uint8_t, const char *> TEXTS[] = {{NO_FAULT, ""},
                                                                 {ACTION_DELAYED, "a move came before activation was complete"},
                                                                 {NOT_ACTIVATED, "a move came without activation"},

@@ -50,6 +50,20 @@ constexpr double SILENCE_s = 1.0;         // then NO_COMMUNICATION
 // knowledge base, "encoder bytes of the adaptive gripper"; taken for the other two as well.
 constexpr int OPEN_COUNT = 3, CLOSED_COUNT = 230;
 
+// What the registers and the names of a URCap (robotiq_urcap.hpp) have in common.
+GripperWay complete_way(const GripperWay &given); // Throws Error: bad_value
+double step_mm(const GripperWay &complete, const GripperTraits &traits);
+struct Request {
+  int position, speed, force; // rPR, rSP, rFR
+};
+Request request_of(const GripperMove &move, const GripperWay &complete, const GripperTraits &traits); // Throws Error: bad_value
+struct Answer {
+  bool active, goes;
+  int gsta, gobj, gpo, gflt;
+};
+GripperStatus status_of(const Answer &answer, std::int64_t asked_us, const GripperWay &complete, const GripperTraits &traits);
+std::string fault_text(std::uint8_t fault);
+
 } // namespace fingertip::robotiq
 
 namespace fingertip {
@@ -62,7 +76,7 @@ public:
   void activate() override;
   GripperStatus poll() override { return status_of(registers_of(read_question(robotiq::REGISTERS), robotiq::REGISTERS)); }
   GripperStatus move(const GripperMove &move) override;
-  std::string fault_text(std::uint8_t fault) const override;
+  std::string fault_text(std::uint8_t fault) const override { return robotiq::fault_text(fault); }
 
 private:
   using Registers = std::array<std::uint16_t, robotiq::REGISTERS>;

@@ -562,7 +562,7 @@ void add_grasp(CommandLine &line) {
   CLI::App *command = line.add("grasp", "Hold an object between two fingertips on a gripper", [options] { return run(*options); });
   with_value(command, "MODEL", "--gripper", options->gripper.model, gripper_model_names())->required();
   with_value(command, "PATH", "--gripper-port", options->gripper.port,
-             "Its serial line; default: the only one on USB that is no fingertip");
+             "Its serial line, or ur:HOST for a Robotiq on a UR arm; default: the only one on USB that is no fingertip");
   with_value(command, "SERIAL|PORT", "--left", options->left, "Fingertip; default: the first of two");
   with_value(command, "SERIAL|PORT", "--right", options->right, "Fingertip; default: the other");
   command->add_flag("--activate", options->activate, "Activate a gripper that is not: it moves, and drops what it holds");

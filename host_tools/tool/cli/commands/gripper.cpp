@@ -238,7 +238,8 @@ void add_gripper(CommandLine &line) {
   with_value(command, "ACTION", "ACTION", options->action, "list, info, move WIDTH, open or close")->required();
   with_value(command, "MM", "WIDTH", options->width_mm, "For move: width between the pads, in mm");
   with_value(command, "MODEL", "--model", options->way.model, "Model of the gripper: " + gripper_model_names());
-  with_value(command, "PATH", "--port", options->way.port, "Its serial line; default: the only one on USB that is no fingertip");
+  with_value(command, "PATH", "--port", options->way.port,
+             "Its serial line, or ur:HOST for a Robotiq on a UR arm; default: the only one on USB that is no fingertip");
   with_value(command, "MM/S", "--speed", options->speed_mm_s, "Speed of the width; default: 50 mm/s, or the nearest that it can");
   with_value(command, "N", "--force", options->force_N,
              "Force at which it stops, by its maker's scale, which is not newtons; default: its least");

@@ -1,0 +1,136 @@
+#include "grasp/gripper/robotiq_urcap.hpp"
+
+#include <arpa/inet.h>
+#include <atomic>
+#include <gtest/gtest.h>
+#include <map>
+#include <sstream>
+#include <sys/socket.h>
+#include <thread>
+
+using namespace fingertip;
+
+namespace {
+
+// The socket of a URCap: its variables, and what it answers instead.
+class Server {
+public:
+  Server() {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    EXPECT_EQ(bind(listener_.get(), reinterpret_cast<sockaddr *>(&address), size), 0);
+    EXPECT_EQ(listen(listener_.get(), 4), 0);
+    getsockname(listener_.get(), reinterpret_cast<sockaddr *>(&address), &size);
+    port = "ur:127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+    thread_ = std::thread([this] { serve(); });
+  }
+  ~Server() {
+    shutdown(listener_.get(), SHUT_RDWR);
+    thread_.join();
+  }
+
+  std::string port;
+  std::map<std::string, int> values{{"STA", 3}, {"GTO", 0}, {"OBJ", 0}, {"POS", 3}, {"FLT", 0}, {"ACT", 1}};
+  std::string last;                           // SET
+  std::map<std::string, std::string> instead; // of the answer to this line; "-": none, and the connection ends
+  std::atomic<int> connections = 0;
+
+private:
+  void serve() {
+    for (int fd; (fd = accept(listener_.get(), nullptr, nullptr)) >= 0;) {
+      const Descriptor line(fd);
+      connections++;
+      char bytes[256];
+      for (ssize_t count; (count = recv(fd, bytes, sizeof bytes, 0)) > 0;) {
+        const std::string answer = answer_to(std::string(bytes, static_cast<std::size_t>(count) - 1));
+        if (answer == "-") {
+          break;
+        }
+        send(fd, answer.data(), answer.size(), MSG_NOSIGNAL);
+      }
+    }
+  }
+  std::string answer_to(const std::string &line) {
+    if (const auto found = instead.find(line); found != instead.end()) {
+      return found->second;
+    }
+    std::istringstream words(line);
+    std::string verb, name;
+    words >> verb >> name;
+    if (verb == "GET") {
+      return name + " " + std::to_string(values.at(name)) + "\n";
+    }
+    last = line;
+    for (int value; words >> value; words >> name) {
+      values[name] = value;
+    }
+    values["STA"] = values["ACT"] == 1 ? 3 : 0;
+    return "ack";
+  }
+
+  Descriptor listener_{socket(AF_INET, SOCK_STREAM, 0)};
+  std::thread thread_;
+};
+
+ErrorCode code_of(const std::function<void()> &act) {
+  try {
+    act();
+  } catch (const Error &error) {
+    return error.code();
+  }
+  return ErrorCode::other;
+}
+
+} // namespace
+
+TEST(Urcap, MovesAndReports) {
+  Server server;
+  const auto gripper = open_gripper({.model = "2f85", .port = server.port, .timeout_s = 5.0});
+  EXPECT_TRUE(gripper->poll().active);
+  gripper->activate();
+  EXPECT_EQ(server.last, "SET ACT 1");
+  GripperStatus status = gripper->move({.width_mm = 42.5, .speed_mm_s = 150, .force_N = 20});
+  EXPECT_EQ(server.last, "SET POS 117 SPE 255 FOR 0 GTO 1");
+  EXPECT_TRUE(status.moving);
+  EXPECT_NEAR(status.width_mm, 42.5, 0.2);
+  server.values["OBJ"] = 2;
+  server.values["FLT"] = 8;
+  status = gripper->poll();
+  EXPECT_FALSE(status.moving);
+  EXPECT_EQ(status.object, true);
+  EXPECT_EQ(gripper->fault_text(status.fault), "too hot, it must cool down");
+  server.values["STA"] = 0;
+  EXPECT_FALSE(gripper->poll().active);
+}
+
+TEST(Urcap, WhatIsNoAnswerIsAnErrorAndTheNextIsAskedAnew) {
+  Server server;
+  const auto gripper = open_gripper({.model = "hande", .port = server.port, .timeout_s = 5.0});
+  for (const auto &[answer, code] : {std::pair("POS x", ErrorCode::gripper_garbled),
+                                     {"OBJ 3", ErrorCode::gripper_garbled},
+                                     {"POS 999", ErrorCode::gripper_garbled},
+                                     {"-", ErrorCode::gripper_silent}}) {
+    const int before = server.connections;
+    server.instead = {{"GET POS", answer}};
+    EXPECT_EQ(code_of([&] { gripper->poll(); }), code) << answer;
+    server.instead.clear();
+    EXPECT_EQ(gripper->poll().width_mm, 50.0);
+    EXPECT_EQ(server.connections, before + 1) << answer;
+  }
+  server.instead = {{"SET ACT 0", "nak"}};
+  EXPECT_EQ(code_of([&] { gripper->activate(); }), ErrorCode::gripper_refused);
+}
+
+TEST(Urcap, WhatCannotBeOpened) {
+  std::string port;
+  {
+    Server server;
+    port = server.port;
+    server.instead = {{"GET STA", ""}};
+    EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = port, .timeout_s = 0.005}); }), ErrorCode::gripper_silent);
+    EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = port, .slave = 9}); }), ErrorCode::bad_value);
+  }
+  EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = port}); }), ErrorCode::cannot_open);
+}
