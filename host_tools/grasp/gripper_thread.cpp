@@ -67,20 +67,16 @@ void GripperThread::put(News news) {
 }
 
 GripperStatus GripperThread::exchange() {
-  GripCommand command{};
-  std::uint64_t number = 0;
-  bool is_new = false;
-  {
-    std::lock_guard lock(mutex_);
-    command = command_;
-    number = number_;
-    is_new = number_ != sent_;
-  }
+  std::unique_lock lock(mutex_);
+  const GripCommand command = command_;
+  const std::uint64_t number = number_;
+  const bool is_new = number_ != sent_;
+  lock.unlock();
   if (is_new && command.motion == GRIP_ACTIVATE) {
     gripper_->activate();
   }
   const GripperStatus status = is_new && command.motion == GRIP_MOVE ? gripper_->move(command) : gripper_->poll();
-  std::lock_guard lock(mutex_);
+  lock.lock();
   sent_ = number;
   return status;
 }

@@ -25,8 +25,7 @@ public:
   struct News {
     std::optional<GripperStatus> status; // an answer
     std::string trouble;                 // or why there is none: once, until the next answer;
-                                         // with an answer what its fault code means, or that
-                                         // no command reached it
+                                         // with an answer what its fault code means, or that no command reached it
   };
 
   // gripper: open; reopen: as it was opened.

@@ -13,16 +13,6 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-std::string digits(const Bytes &bytes) {
-  std::string text;
-  char two[4];
-  for (std::uint8_t byte : bytes) {
-    std::snprintf(two, sizeof two, "%02X", byte);
-    text += (text.empty() ? "" : " ") + std::string(two);
-  }
-  return text;
-}
-
 Bytes bytes_of(const std::string &text) {
   Bytes bytes;
   for (std::size_t at = 0; at + 1 < text.size(); at += 3) {
@@ -34,6 +24,16 @@ Bytes bytes_of(const std::string &text) {
 constexpr std::chrono::milliseconds ROUND{10};
 
 } // namespace
+
+std::string digits(const Bytes &bytes) {
+  std::string text;
+  char two[4];
+  for (std::uint8_t byte : bytes) {
+    std::snprintf(two, sizeof two, "%02X", byte);
+    text += (text.empty() ? "" : " ") + std::string(two);
+  }
+  return text;
+}
 
 Repeated::Repeated(std::function<void()> act)
     : thread_([this, act = std::move(act)] {

@@ -61,7 +61,8 @@ private:
   Repeated plays_;
 };
 
-/* Bytes in hexadecimal digits, with Modbus' checksum after them. */
+/* Bytes in hexadecimal digits; the same with Modbus' checksum after them. */
+std::string digits(const std::vector<std::uint8_t> &bytes);
 std::string with_crc(const std::string &bytes);
 
 /* The first so many bytes that come after this question. */

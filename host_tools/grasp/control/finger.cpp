@@ -78,15 +78,11 @@ void GripFinger::take(const GripTouch &touch) {
     sd_N_ = (touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) != 0 ? touch.force_sd_N : 0.0;
   }
   if (has_load()) {
-    sum_x_N_ += touch.qx_N;
-    sum_y_N_ += touch.qy_N;
-    sums_++;
+    load_zero_.take(touch.qx_N, touch.qy_N);
   }
   if (has_contact && (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (touch.flags & NO_PLACE) == 0) {
-    sum_x_mm_ += touch.x_mm;
-    sum_y_mm_ += touch.y_mm;
-    places_++;
-    const double moved_mm = has_zero_place_ ? std::hypot(touch.x_mm - zero_x_mm_, touch.y_mm - zero_y_mm_) : 0.0;
+    place_zero_.take(touch.x_mm, touch.y_mm);
+    const double moved_mm = place_zero_.is_known ? std::hypot(touch.x_mm - place_zero_.x, touch.y_mm - place_zero_.y) : 0.0;
     const double pulled = moved_mm / std::min(PULLED * std::max(touch.sigma_mm, 1.0), PULLED_mm);
     pulled_ = std::min(pulled, pulled_ + (pulled - pulled_) * std::min((touch.t_s - place_t_s_) / PULLS_s, 1.0));
     place_t_s_ = touch.t_s;
@@ -97,26 +93,17 @@ bool GripFinger::has_load() const { return (touch_.flags & CONTACT_FLAG_TANGENTI
 
 void GripFinger::begin_zero() {
   of_both_ = 1.0; // another object
-  zero_x_N_ = zero_y_N_ = sum_x_N_ = sum_y_N_ = 0.0;
-  sum_x_mm_ = sum_y_mm_ = 0.0;
-  sums_ = places_ = 0;
-  has_zero_place_ = is_zeroed_ = false;
+  load_zero_ = place_zero_ = {};
+  is_zeroed_ = false;
 }
 
 void GripFinger::end_zero() {
-  if (sums_ > 0) {
-    zero_x_N_ = sum_x_N_ / sums_;
-    zero_y_N_ = sum_y_N_ / sums_;
-  }
-  if (places_ > 0) {
-    zero_x_mm_ = sum_x_mm_ / places_;
-    zero_y_mm_ = sum_y_mm_ / places_;
-  }
-  has_zero_place_ = places_ > 0;
+  load_zero_.end();
+  place_zero_.end();
   is_zeroed_ = true;
 }
 
-bool GripFinger::has_zero() const { return !has_load() || sums_ >= ZERO_FRAMES; }
+bool GripFinger::has_zero() const { return !has_load() || load_zero_.frames >= ZERO_FRAMES; }
 
 GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
   GripReading reading;
@@ -149,14 +136,14 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
   reading.has_load = reading.contact && has_load();
   bool recoils = false; // moves against its load
   if (reading.has_load) {
-    reading.load_x_N = touch_.qx_N - zero_x_N_;
-    reading.load_y_N = touch_.qy_N - zero_y_N_;
+    reading.load_x_N = touch_.qx_N - load_zero_.x;
+    reading.load_y_N = touch_.qy_N - load_zero_.y;
     reading.load_N = std::hypot(reading.load_x_N, reading.load_y_N);
     reading.load_sd_N = std::max(touch_.q_sd_N, LOAD_SD_LEAST_N);
     reading.speed_mm_s = std::hypot(touch_.speed_x_mm_s, touch_.speed_y_mm_s);
     recoils = reading.load_N > SHARED_N && touch_.speed_x_mm_s * reading.load_x_N + touch_.speed_y_mm_s * reading.load_y_N < 0.0;
   }
-  reading.has_place = reading.contact && touch_.t_s < place_t_s_ + settings.stale_s && (has_zero_place_ || !is_zeroed_);
+  reading.has_place = reading.contact && touch_.t_s < place_t_s_ + settings.stale_s && (place_zero_.is_known || !is_zeroed_);
   reading.pulled = reading.has_place ? pulled_ : 0.0;
   // Eq. (7) mistakes a tangential force for a slide, so it counts only if there is no other evidence, and no friction
   // explains how far the contact has moved.

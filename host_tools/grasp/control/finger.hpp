@@ -83,11 +83,20 @@ private:
   double doubted_s_ = 0.0, of_both_ = 1.0, mark_x_N_ = 0.0, mark_y_N_ = 0.0;
   bool is_doubted_ = false, is_marked_ = false;
   int unchanged_ = 0; // frames whose values are those of the one before
-  double zero_x_N_ = 0.0, zero_y_N_ = 0.0, sum_x_N_ = 0.0, sum_y_N_ = 0.0;
+  struct Zero {       // the mean, once it has ended
+    double x = 0.0, y = 0.0, sum_x = 0.0, sum_y = 0.0;
+    int frames = 0;
+    bool is_known = false;
+    void take(double at_x, double at_y) { sum_x += at_x, sum_y += at_y, frames++; }
+    void end() {
+      is_known = frames > 0;
+      x = is_known ? sum_x / frames : 0.0;
+      y = is_known ? sum_y / frames : 0.0;
+    }
+  };
+  Zero load_zero_, place_zero_;
   double place_t_s_ = -1.0, pulled_ = 0.0;
-  double zero_x_mm_ = 0.0, zero_y_mm_ = 0.0, sum_x_mm_ = 0.0, sum_y_mm_ = 0.0;
-  bool has_zero_place_ = false, is_zeroed_ = false; // the latter: end_zero since begin_zero
-  int sums_ = 0, places_ = 0;
+  bool is_zeroed_ = false; // end_zero since begin_zero
 };
 
 // The combined reading of both fingertips; a reading that is not trusted is left out.

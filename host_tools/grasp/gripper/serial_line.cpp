@@ -16,9 +16,7 @@ namespace fingertip {
 namespace fs = std::filesystem;
 
 static speed_t speed_of(unsigned baud) {
-  static constexpr std::pair<unsigned, speed_t> SPEEDS[] = {{115200, B115200}, {1000000, B1000000}};
-  const auto *found = find_in(SPEEDS, [&](const auto &one) { return one.first == baud; });
-  return found ? found->second : throw std::logic_error("no such speed");
+  return baud == 115200 ? B115200 : baud == 1000000 ? B1000000 : throw std::logic_error("no such speed");
 }
 
 static std::string line_of(const fs::path &path) {

@@ -18,9 +18,8 @@ public:
   void drop_input();
 };
 
-// Milliseconds that a USB adapter holds back an answer that does not fill a packet; empty where its
-// driver does not report it. 16 is usual: an exchange then takes as long, which allows 62 a second.
-// root: where to look for sys/, "/" except in tests.
+// Milliseconds that a USB adapter holds back an answer that does not fill a packet; empty where its driver does not report it. 16 is usual:
+// an exchange then takes as long, which allows 62 a second. root: where to look for sys/, "/" except in tests.
 std::optional<int> latency_timer_ms(const std::string &port, const std::string &root = "/");
 
 struct GripperPort {

@@ -158,15 +158,6 @@ void expect(FaultTrial &one) {
   }
 }
 
-// What fails is a line's and a drive's, not a stroke's.
-std::map<GripperDriver, std::string> one_of_each_driver() {
-  std::map<GripperDriver, std::string> models;
-  for (const GripperTraits &traits : gripper_models()) {
-    models.emplace(traits.driver, traits.model);
-  }
-  return models;
-}
-
 KindOutcome outcome_of(const FaultTrial &one, const KindTrial &trial) {
   const GripperTraits &traits = trial.gripper.traits;
   CoreController controller(settings_for(traits, {{"cap", one.thing.cap_N}}), traits);
@@ -209,7 +200,11 @@ nlohmann::ordered_json row_of(const FaultTrial &one, double may_open_mm) {
 nlohmann::ordered_json fault_rows(std::uint64_t jobs) {
   std::vector<FaultTrial> all;
   std::uint64_t grasps = 0;
-  for (const auto &[driver, gripper] : one_of_each_driver()) {
+  std::map<GripperDriver, std::string> models; // one of each: what fails is a line's and a drive's, not a stroke's
+  for (const GripperTraits &traits : gripper_models()) {
+    models.emplace(traits.driver, traits.model);
+  }
+  for (const auto &[driver, gripper] : models) {
     for (const Thing &thing : THINGS) {
       for (const When &when : STATES) {
         grasps++;

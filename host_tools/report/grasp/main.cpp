@@ -205,21 +205,18 @@ int run(int argc, char **argv) {
       ->capture_default_str();
   app.add_option("--set", options.settings, "Of our settings, split by commas: margin=1.4")->type_name("NAME=VALUE");
   app.add_option("--mass", options.mass_share, "Expected mass, of the true one")->check(CLI::NonNegativeNumber);
-  app.add_option("--later", options.later_ms, "All frames come later")->check(CLI::NonNegativeNumber)->type_name("MS");
-  app.add_option("--rate", options.rate_Hz, "Frames of a fingertip")
-      ->check(CLI::Range(1.0, 1600.0))
-      ->type_name("HZ")
-      ->capture_default_str();
-  app.add_option("--load", options.load_share, "Share of the load that frames report; 0: they report none")
+  const auto number = [&](const char *name, double &value, const char *unit, const char *help) {
+    return app.add_option(name, value, help)->type_name(unit);
+  };
+  number("--later", options.later_ms, "MS", "All frames come later")->check(CLI::NonNegativeNumber);
+  number("--rate", options.rate_Hz, "HZ", "Frames of a fingertip")->check(CLI::Range(1.0, 1600.0))->capture_default_str();
+  number("--load", options.load_share, "SHARE", "Share of the load that frames report; 0: they report none")
       ->check(CLI::Range(0.0, 1.0))
-      ->type_name("SHARE")
       ->capture_default_str();
-  app.add_option("--still", options.still_s, "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
-      ->check(CLI::PositiveNumber)
-      ->type_name("S");
-  const auto wrong = texts_of(WRONG, [](const Wrong &one) { return one.name; });
+  number("--still", options.still_s, "S", "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
+      ->check(CLI::PositiveNumber);
   app.add_option("--wrong", options.wrong, "Instead of events: what one fingertip reports wrongly in a steady hold")
-      ->check(CLI::IsMember(wrong));
+      ->check(CLI::IsMember(texts_of(WRONG, [](const Wrong &one) { return one.name; })));
   app.add_option("--seed", options.seed, "Another set of grasps; 1 to 999 are there to choose constants by, the report judges by others")
       ->capture_default_str();
   app.add_option("--count", options.count, "Grasps")->check(CLI::Range(1, 1000000))->capture_default_str();

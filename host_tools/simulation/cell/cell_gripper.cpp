@@ -47,16 +47,12 @@ int main(int argc, char **argv) {
   app.add_option("--model", options.server.model, "Which one")->required()->check(CLI::IsMember(models));
   app.add_option("--slave", options.server.slave, "Its address on the line; else the usual")->check(CLI::Range(1, 253));
   app.add_option("--link", options.server.link, "A name for the port, as long as it is served")->type_name("PATH");
-  app.add_option("--object", options.object_mm, "An object of this width lies between its fingers")
-      ->type_name("MM")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--stiffness", options.stiffness_N_mm, "How it pushes back, in N/mm")
-      ->type_name("NUMBER")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--line", options.trouble.fault, "What befalls each answer")
-      ->type_name("FAULT")
-      ->transform(CLI::CheckedTransformer(line_faults()));
+  const auto add = [&](const char *name, auto &value, const char *unit, const char *help) {
+    return app.add_option(name, value, help)->type_name(unit);
+  };
+  add("--object", options.object_mm, "MM", "An object of this width lies between its fingers")->check(CLI::PositiveNumber);
+  add("--stiffness", options.stiffness_N_mm, "NUMBER", "How it pushes back, in N/mm")->check(CLI::PositiveNumber)->capture_default_str();
+  add("--line", options.trouble.fault, "FAULT", "What befalls each answer")->transform(CLI::CheckedTransformer(line_faults()));
   app.add_option("--fault", options.fault, "The gripper's own, by the maker's code")->type_name("CODE")->check(CLI::Range(0, 255));
   CLI11_PARSE(app, argc, argv);
   for (int signal : {SIGINT, SIGTERM}) {

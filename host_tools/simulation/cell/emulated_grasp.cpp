@@ -1,8 +1,7 @@
 // fingertip_cell_emulated: the world of one grasp, closed loop, whose fingertips are emulated boards with their release image. It speaks
 // the protocol of host_tools/simulation/emulator/lockstep.mjs on its standard input and output: the cell, the gripper and the controller go
-// on by slices of emulated time, after each of which the boards' bytes are handed over.
-//
-// The controller takes what came in a slice at its end, so up to a slice late; all else is at its own time.
+// on by slices of emulated time, after each of which the boards' bytes are handed over. The controller takes what came in a slice at its
+// end, so up to a slice late; all else is at its own time.
 #include "grasp/fingertip.hpp"
 #include "grasp/gripper/gripper.hpp"
 #include "libfingertip/clock_fit.hpp"
@@ -52,10 +51,8 @@ constexpr double LOST_N = 0.01;
 constexpr double PAD_SD = 0.08, CALIBRATION_SD = 0.012, FORCE_SCALE_SD = 0.05;
 constexpr double MORE_LOAD = 1.1, MORE_LOAD_N = 0.1;
 
-// A fingertip that is an emulated board, from the host's end of its USB line: it gets its pad's
-// profile and its calibration first, then it streams its readings.
-//
-// Its clock is fitted from commands and their acknowledgements, as the tool does it, on the emulated time.
+// A fingertip that is an emulated board, from the host's end of its USB line: it gets its pad's profile and its calibration first, then it
+// streams its readings. Its clock is fitted from commands and their acknowledgements, as the tool does it, on the emulated time.
 class EmulatedFingertip {
 public:
   // random: of its sensors' gains and its calibration.

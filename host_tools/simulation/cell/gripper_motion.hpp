@@ -1,8 +1,7 @@
-// How a simulated gripper's fingers move, in simulated time: no line, no clock, no chance.
-//
-// A command counts after the latency, and one that came later replaces it only after its own. Fingers run at constant speed to the nearest
-// step and stop at once; what accelerates is not modelled, and nothing but backlash lets an object push them apart: a 2F-85's screw holds,
-// a servo would yield. Latencies and the servo's backlash are assumptions, no measurements.
+// How a simulated gripper's fingers move, in simulated time: no line, no clock, no chance. A command counts after the latency, and one that
+// came later replaces it only after its own. Fingers run at constant speed to the nearest step and stop at once; what accelerates is not
+// modelled, and nothing but backlash lets an object push them apart: a 2F-85's screw holds, a servo would yield. Latencies and the servo's
+// backlash are assumptions, no measurements.
 #pragma once
 
 #include "grasp/gripper/gripper.hpp"
@@ -28,10 +27,9 @@ public:
   // Not active yet; the fingers are open.
   explicit GripperMotion(const GripperMechanics &mechanics);
 
-  // Whether what is between the fingers pushes back with at least force_N at this width; below 0:
-  // what is around them, while they open. Asked with widths that the fingers are about to take, and
-  // for backlash with the least force; must be true for all narrower widths if it is for one.
-  // Empty: nothing is there.
+  // Whether what is between the fingers pushes back with at least force_N at this width; below 0: what is around them, while they open.
+  // Asked with widths that the fingers are about to take, and for backlash with the least force; must be true for all narrower widths if it
+  // is for one. Empty: nothing is there.
   std::function<bool(double width_mm, double force_N)> blocked_at;
 
   // Where its ends are searched, opens and closes fully, at whatever force, so that what is held falls; then it takes moves.

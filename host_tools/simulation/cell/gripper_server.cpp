@@ -74,13 +74,6 @@ void GripperServer::take() {
   }
 }
 
-void GripperServer::send_due() {
-  for (; !answers_.empty() && answers_.front().due <= host_now(); answers_.pop_front()) {
-    // A port that is not read fills up; what does not fit is lost, as on any line.
-    port_.write(answers_.front().bytes.data(), answers_.front().bytes.size());
-  }
-}
-
 void GripperServer::step(std::chrono::microseconds longest_wait) {
   HostTime until = host_now() + longest_wait;
   if (!answers_.empty()) {
@@ -105,7 +98,10 @@ void GripperServer::step(std::chrono::microseconds longest_wait) {
     came_at_ = now;
     take();
   }
-  send_due();
+  for (; !answers_.empty() && answers_.front().due <= host_now(); answers_.pop_front()) {
+    // A port that is not read fills up; what does not fit is lost, as on any line.
+    port_.write(answers_.front().bytes.data(), answers_.front().bytes.size());
+  }
 }
 
 } // namespace fingertip

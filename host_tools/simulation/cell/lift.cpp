@@ -60,18 +60,12 @@ void open_gripper(GripperServer &server, GripperMotion &motion, const std::strin
   std::string why;
   Thread client([&] {
     try {
-      GripperWay way;
-      way.model = model;
-      way.port = server.port();
-      way.timeout_s = 10.0; // however busy this machine is
-      const auto gripper = open_gripper(way);
+      const auto gripper =
+          fingertip::open_gripper({.model = model, .port = server.port(), .timeout_s = 10.0}); // however busy this machine is
       gripper->activate();
       while (!gripper->poll().active) {
       }
-      GripperMove move;
-      move.width_mm = width_mm;
-      move.speed_mm_s = gripper->traits().speed_max_mm_s;
-      gripper->move(move);
+      gripper->move({.width_mm = width_mm, .speed_mm_s = gripper->traits().speed_max_mm_s});
       while (gripper->poll().moving) {
       }
     } catch (const Error &error) {
@@ -94,7 +88,8 @@ public:
   Lift(const LiftOptions &options, const Place &place)
       : options_(options), place_(place), face_(options.face, LAYER_mm, options.cache),
         fingers_(place, place.fingers(FINGERS, options.seed, options.gain_spread.value_or(0.05), false, options.gain_sd)),
-        motion_(GripperServer::mechanics(options.model)), server_(motion_, server_options()) {
+        motion_(GripperServer::mechanics(options.model)),
+        server_(motion_, {.model = options.model, .link = place.port(".gripper"), .real_time = false}) { // the link until all is ready
     fingers_.wait_until_ready();
     open_gripper(server_, motion_, options.model, options.world.grasp.width_mm + options.opens_mm);
     server_.rename(place.port("gripper"));
@@ -123,14 +118,6 @@ public:
   }
 
 private:
-  GripperServer::Options server_options() const {
-    GripperServer::Options server;
-    server.model = options_.model;
-    server.real_time = false;
-    server.link = place_.port(".gripper"); // until all is ready
-    return server;
-  }
-
   std::string head() const {
     const KindOfGrasp &grasp = options_.world.grasp;
     std::ostringstream text;

@@ -87,10 +87,7 @@ Fingers::Fingers(const Place &place, const std::vector<FingerProcess> &fingers) 
   if (memory == MAP_FAILED) {
     throw std::bad_alloc();
   }
-  shared_ = static_cast<SharedPressures *>(memory);
-  for (std::size_t i = 0; i < count(); i++) {
-    new (&shared_[i]) SharedPressures();
-  }
+  shared_ = new (memory) SharedPressures[count()];
   for (std::size_t i = 0; i < count(); i++) {
     processes_[i] = start_finger(fingers_[i], shared_[i]);
   }

@@ -1,8 +1,7 @@
-// A simulated Robotiq gripper: a Modbus slave and registers (gripper/robotiq.hpp) over its motion.
-//
-// After the manuals: activation begins where rACT rises and takes its time; a move before gives gFLT 7, one while it goes on gFLT 5 and is
-// done afterwards. Assumed, for nothing is public: gFLT 9 is reported once, by the first answer after a second of silence, and what moves
-// goes on; a move begins where a register of it changes or rGTO rises. Left out: automatic release, which the driver never asks for.
+// A simulated Robotiq gripper: a Modbus slave and registers (gripper/robotiq.hpp) over its motion. After the manuals: activation begins
+// where rACT rises and takes its time; a move before gives gFLT 7, one while it goes on gFLT 5 and is done afterwards. Assumed, for nothing
+// is public: gFLT 9 is reported once, by the first answer after a second of silence, and what moves goes on; a move begins where a register
+// of it changes or rGTO rises. Left out: automatic release, which the driver never asks for.
 #include "grasp/gripper/robotiq.hpp"
 #include "simulation/cell/gripper_server.hpp"
 

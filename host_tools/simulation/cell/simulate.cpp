@@ -43,32 +43,25 @@ std::string tables_for(const std::string &face) {
   return twin::default_cache_directory().string();
 }
 
-void run(const Options &options, bool is_lift, bool is_validate) {
+void run(Options &options, bool is_lift, bool is_validate) {
   if (!options.truth.empty()) {
     check_output(options.truth, options.overwrite);
   }
-  const auto cache = [&](const std::string &face) { return options.cache.empty() ? tables_for(face) : options.cache; };
+  options.cache = options.cache.empty() ? tables_for(is_lift ? options.lift.face : PRESS_FACE) : options.cache;
   if (is_lift) {
-    LiftOptions one = options.lift;
-    static_cast<SimulationOptions &>(one) = options;
-    one.cache = cache(one.face);
+    static_cast<SimulationOptions &>(options.lift) = options;
     if (!options.kind.empty()) {
-      be_of_kind(one, kind_of(options.kind));
+      be_of_kind(options.lift, kind_of(options.kind));
     }
-    check(one);
-    lift(one, Place(options.ports));
+    check(options.lift);
+    lift(options.lift, Place(options.ports));
   } else if (is_validate) {
-    ValidatedOptions one;
-    one.weight_g = options.press.weight_g;
-    one.pulling.weight_g = options.pull_g;
-    one.seed = options.seed;
-    one.cache = cache(PRESS_FACE);
+    const ValidatedOptions one = {
+        .weight_g = options.press.weight_g, .pulling = {.weight_g = options.pull_g}, .seed = options.seed, .cache = options.cache};
     validate(one, options.seconds, Place(options.ports));
   } else {
-    PressOptions one = options.press;
-    static_cast<SimulationOptions &>(one) = options;
-    one.cache = cache(PRESS_FACE);
-    press(one, Place(options.ports));
+    static_cast<SimulationOptions &>(options.press) = options;
+    press(options.press, Place(options.ports));
   }
 }
 
@@ -87,7 +80,7 @@ int main(int argc, char **argv) {
   double friction = object.pads[0].friction;
   std::string shape = name_of(object.shape);
   std::vector<std::string> planned_texts;
-  bool is_press = false, by_command = false;
+  bool is_press = false, is_lift = false, is_validate = false, by_command = false;
   double lift_after_s = *options.lift.world.lift_after_s;
   const auto add = [&](const char *name, auto &value, const char *unit, const char *help) {
     return app.add_option(name, value, help)->type_name(unit);
@@ -104,11 +97,13 @@ int main(int argc, char **argv) {
   CLI::Option *mouse_flag = app.add_flag("--mouse", options.press.by_hand,
                                          "A hand presses the ball: yours, with the pointer on the pad in the page of `fingertip web`");
   CLI::Option *lift_flag =
-      app.add_flag("--lift", "Two fingertips on a gripper with an object between: `fingertip grasp --gripper 2f85 --gripper-port "
-                             "sim:gripper` grasps it, then a hand lifts it. Obeys lines of standard input (help lists them)");
+      app.add_flag("--lift", is_lift,
+                   "Two fingertips on a gripper with an object between: `fingertip grasp --gripper 2f85 --gripper-port "
+                   "sim:gripper` grasps it, then a hand lifts it. Obeys lines of standard input (help lists them)");
   CLI::Option *validate_flag =
-      app.add_flag("--validate", "A hand that goes through the steps of `fingertip validate`, when that begins: the weight at each mark of "
-                                 "the template, a hold, a rest");
+      app.add_flag("--validate", is_validate,
+                   "A hand that goes through the steps of `fingertip validate`, when that begins: the weight at each mark of "
+                   "the template, a hold, a rest");
   mouse_flag->excludes(press_flag);
   lift_flag->excludes(press_flag, mouse_flag);
   validate_flag->excludes(press_flag, mouse_flag, lift_flag);
@@ -186,7 +181,7 @@ int main(int argc, char **argv) {
     object.shape = shape_of(shape);
     object.pads[0].friction = object.pads[1].friction = friction;
     stiffen(object);
-    run(options, lift_flag->count() > 0, validate_flag->count() > 0);
+    run(options, is_lift, is_validate);
     return 0;
   } catch (const Error &error) {
     print_error("fingertip", error);

@@ -50,6 +50,12 @@ public:
       millisecond();
     }
   }
+  // Grasps it, which pulls so hard within this time, and holds it for a while.
+  void carry(double to_N, double within_s, double then_s) {
+    grasp();
+    pull(to_N, within_s);
+    run(then_s);
+  }
   // It slides at this ratio of tangential to normal force, so fast, for so long.
   void slide(double ratio, double speed_mm_s, double seconds) {
     for (int i = 0; i < std::lround(1e3 * seconds); i++) {

@@ -87,9 +87,7 @@ TEST(Grip, OneFingertipThatReportsNothingOrFarMoreMovesNothing) {
   for (const double gain : {0.0, 3.0}) {
     for (const double seconds : {0.003, 0.024, 3.0}) {
       GripWorld world;
-      world.grasp();
-      world.pull(2.0, 0.3);
-      world.run(2.0);
+      world.carry(2.0, 0.3, 2.0);
       const double before_N = world.force_N;
       world.gain[0] = gain;
       world.run(seconds);
@@ -276,9 +274,7 @@ TEST(Grip, OpensByWhatEveryFingertipThatHadALoadReports) {
     for (const double to_N : {0.0, 3.2}) {
       GripWorld world;
       world.load_share[1] = 0.5;
-      world.grasp();
-      world.pull(2.0, 0.3);
-      world.run(2.0);
+      world.carry(2.0, 0.3, 2.0);
       ASSERT_TRUE(world.grip.request(to_N > 2.0 ? GRIP_REQUEST_HAND_OVER : GRIP_REQUEST_PLACE));
       world.drop_flags[hidden] = CONTACT_FLAG_TANGENTIAL_VALID;
       world.run(0.5);
@@ -298,9 +294,7 @@ TEST(Grip, PlacesAndHandsOverWithoutAFingertipThatIsMuteOrHasHardlyALoad) {
     for (const int mutes : {0, 1, 2}) {
       GripWorld world;
       world.load_share[1] = mutes == 0 ? 0.04 : 1.0;
-      world.grasp();
-      world.pull(2.0, 0.3);
-      world.run(2.0);
+      world.carry(2.0, 0.3, 2.0);
       ASSERT_TRUE(world.grip.request(to_N > 2.0 ? GRIP_REQUEST_HAND_OVER : GRIP_REQUEST_PLACE));
       world.mute = {mutes == 2, mutes > 0};
       world.run(0.2);
@@ -316,9 +310,7 @@ TEST(Grip, PlacesAndHandsOverWithoutAFingertipThatIsMuteOrHasHardlyALoad) {
 
 TEST(Grip, HandsOverWhatIsGone) {
   GripWorld world;
-  world.grasp();
-  world.pull(2.0, 0.3);
-  world.run(2.0);
+  world.carry(2.0, 0.3, 2.0);
   ASSERT_TRUE(world.grip.request(GRIP_REQUEST_HAND_OVER));
   world.object_mm = 0.0;
   world.run(0.2);
@@ -327,9 +319,7 @@ TEST(Grip, HandsOverWhatIsGone) {
 
 TEST(Grip, SettingsChangeWhileItHolds) {
   GripWorld world;
-  world.grasp();
-  world.pull(4.0, 0.3);
-  world.run(1.0);
+  world.carry(4.0, 0.3, 1.0);
   EXPECT_GT(world.force_N, 7.0);
   ASSERT_TRUE(world.grip.change(settings_for(world.traits, {{"cap", 5}})));
   world.run(1.0);

@@ -10,9 +10,7 @@ using test::GripWorld;
 
 TEST(Grip, FollowsTheLoadAndFallsToTheFloorThen) {
   GripWorld world;
-  world.grasp();
-  world.pull(3.0, 0.3);
-  world.run(1.5);
+  world.carry(3.0, 0.3, 1.5);
   const double needed_N = world.settings.margin * 3.0 / world.report.friction;
   expect_share(needed_N, world.force_N, 0.08);
   expect_share(3.0, world.report.load_N, 0.05);
@@ -34,9 +32,7 @@ TEST(Grip, WhatPullsBeforeCountsAsNone) {
 // A slide is learnt from as it goes on: its friction is that of motion, not the larger one of rest.
 TEST(Grip, LearnsFrictionWhileItSlides) {
   GripWorld world;
-  world.grasp();
-  world.pull(2.5, 0.3);
-  world.run(0.5);
+  world.carry(2.5, 0.3, 0.5);
   const double held = world.load_N / world.force_N;
   world.slide(0.95 * held, 10.0, 0.01);
   world.slide(0.7 * held, 40.0, 0.06);
@@ -47,9 +43,7 @@ TEST(Grip, LearnsFrictionWhileItSlides) {
 // Rubber that springs back moves against its load: that is no slide, and teaches no friction.
 TEST(Grip, WhatMovesAgainstItsLoadDoesNotSlide) {
   GripWorld world;
-  world.grasp();
-  world.pull(2.5, 0.3);
-  world.run(0.5);
+  world.carry(2.5, 0.3, 0.5);
   const double friction = world.report.friction, before_N = world.force_N;
   world.slide(0.3 * friction, -40.0, 0.2);
   EXPECT_EQ(world.report.slides, 0u);
@@ -59,9 +53,7 @@ TEST(Grip, WhatMovesAgainstItsLoadDoesNotSlide) {
 
 TEST(Grip, ASlideRaisesTheGripAtOnceAndEndsAtItsMargin) {
   GripWorld world;
-  world.grasp();
-  world.pull(2.0, 0.3);
-  world.run(1.0);
+  world.carry(2.0, 0.3, 1.0);
   const double before_N = world.force_N, friction = 0.8 * 2.0 / before_N;
   world.slide(friction, 20.0, 0.03);
   EXPECT_EQ(world.report.state, GRIP_SLIPPING);
@@ -78,9 +70,7 @@ TEST(Grip, ASlideRaisesTheGripAtOnceAndEndsAtItsMargin) {
 // carries its friction at least, however small the load was before.
 TEST(Grip, ASlideThatGoesOnTellsALargerLoad) {
   GripWorld world;
-  world.grasp();
-  world.pull(0.8, 0.3);
-  world.run(1.0);
+  world.carry(0.8, 0.3, 1.0);
   const double before_N = world.force_N;
   for (double speed_mm_s = 20.0; speed_mm_s < 60.0; speed_mm_s += 1.0) {
     world.slide(0.6, speed_mm_s, 0.01);
@@ -129,9 +119,7 @@ TEST(Grip, WhatWasExpectedAndHasNotComeIsNotPursued) {
 // The tangential force of a sliding contact is its friction, no load: it does not feed itself.
 TEST(Grip, ASteadyLoadIsNotWhatSlides) {
   GripWorld world;
-  world.grasp();
-  world.pull(2.0, 0.3);
-  world.run(1.0);
+  world.carry(2.0, 0.3, 1.0);
   const double friction = 0.7 * 2.0 / world.force_N;
   const double needed_N = world.settings.margin * world.settings.slid * 2.0 / friction;
   world.slide(friction, 30.0, 0.02);
@@ -174,9 +162,7 @@ TEST(Grip, ASlideThatSlowsDownIsNotPursued) {
 // Squeezed rubber moves a contact by less than a millimetre, far below what it holds.
 TEST(Grip, AShortMotionFarBelowWhatHoldsIsNoSlide) {
   GripWorld world;
-  world.grasp();
-  world.pull(2.0, 0.3);
-  world.run(1.0);
+  world.carry(2.0, 0.3, 1.0);
   const double held = world.load_N / world.force_N;
   world.slide(0.4 * held, 9.0, 0.07);
   EXPECT_EQ(world.report.slides, 0u);

@@ -7,9 +7,7 @@ using test::GripWorld;
 TEST(Grip, NoHuntingWhileTheWantedForceFalls) {
   for (const char *model : {"2f85", "sts3215"}) {
     GripWorld world({}, gripper_traits(model));
-    world.grasp();
-    world.pull(4.0, 0.3);
-    world.run(1.0);
+    world.carry(4.0, 0.3, 1.0);
     world.pull(1.0, 0.3);
     world.turns = 0;
     world.run(4.0);
@@ -23,9 +21,7 @@ TEST(Grip, TheTrueForceStaysBelowTheCap) {
       GripWorld world({{"cap", 10}}, gripper_traits(model));
       world.power = power;
       world.gain = {0.92, 0.92};
-      world.grasp();
-      world.pull(9.0, 0.2);
-      world.run(2.0);
+      world.carry(9.0, 0.2, 2.0);
       EXPECT_LE(world.peak_N, 10.0) << model << " " << power;
       EXPECT_GT(world.peak_N, 5.0) << model << " " << power;
       EXPECT_LE(world.report.wanted_N, 10.0);

@@ -104,15 +104,7 @@ TEST(Feetech, FaultsAreBits) {
 using feetech::Bytes;
 using feetech::Packet;
 
-static std::string text(const Packet &packet) {
-  std::string digits;
-  for (std::uint8_t byte : feetech::encoded(packet)) {
-    char two[4];
-    std::snprintf(two, sizeof two, "%02X", byte);
-    digits += (digits.empty() ? "" : " ") + std::string(two);
-  }
-  return digits;
-}
+static std::string text(const Packet &packet) { return digits(feetech::encoded(packet)); }
 
 const Packet ASK_TABLE = {6, feetech::READ, {feetech::MODEL, 31}};
 const Packet ASK_STATUS = {6, feetech::READ, {feetech::TORQUE_ENABLE, 31}};
