@@ -25,6 +25,10 @@ PATIENCE_s = 300  # ends what hangs
 CHECKSUM = ROOT / "cmake" / "boot2_checksum.py"
 
 
+def setUpModule():
+    Folder.tools = unittest.enterModuleContext(tempfile.TemporaryDirectory())
+
+
 class Folder(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
@@ -46,15 +50,14 @@ class Folder(unittest.TestCase):
         return subprocess.run(call, capture_output=True, text=True, timeout=PATIENCE_s, env=environment)
 
     def path_without(self, *missing):
-        """A PATH that leads to every program of this machine but those."""
-        tools = self.folder / "path"
-        tools.mkdir()
-        for folder in os.environ["PATH"].split(":") + ["/usr/bin", "/bin"]:
-            for program in pathlib.Path(folder).glob("*"):
-                link = tools / program.name
-                if program.name not in missing and not os.path.lexists(link):
-                    link.symlink_to(program)
-        return str(tools)
+        """A PATH that leads to every program of this machine but those. It is one folder, of which the next call makes another."""
+        folders = ["/bin", "/usr/bin", *reversed(os.environ["PATH"].split(":"))]
+        programs = {entry.name: entry.path for folder in folders if os.path.isdir(folder) for entry in os.scandir(folder)}
+        for name, program in programs.items():
+            link = os.path.join(self.tools, name)
+            if os.path.lexists(link) == (name in missing):
+                os.unlink(link) if name in missing else os.symlink(program, link)
+        return self.tools
 
 
 class Boot2Checksum(Folder):
@@ -103,10 +106,8 @@ class FetchUnity(Folder):
         shell = shutil.which("sh")
         for tool in ("sha256sum", "apt-get", "awk", "sort", "tar", "xz"):
             with self.subTest(tool):
-                environment = {"PATH": self.path_without(tool)}
                 call = [shell, ROOT / "cmake/fetch_unity.sh", self.folder / "unity"]
-                done = subprocess.run(call, capture_output=True, text=True, env=environment)
-                shutil.rmtree(environment["PATH"])
+                done = subprocess.run(call, capture_output=True, text=True, env={"PATH": self.path_without(tool)})
                 self.assertEqual(done.returncode, 1)
                 self.assertEqual(done.stderr, f"fetch_unity: {tool} is missing; install it and run again\n")
 
@@ -184,12 +185,11 @@ class Bootstrap(Folder):
             done = self.up_to_npm(node=None, path=path)
             self.assertEqual(done.returncode, 33, done.stderr)
             self.assertEqual("== fetching node and npm with pip" in done.stdout, fetches)
-        for unusable in ("./absent", f"./{wheel}", f"./{wheel} --hash=sha256:{'0' * 64}"):  # what was not pinned, what was changed
-            pinned.write_text(unusable + "\n")
-            done = self.up_to_npm(node=None, path=path)
-            self.assertEqual(done.returncode, 1, unusable)
-            self.assertTrue(done.stderr.endswith("connect to the internet and run again, or install nodejs and npm\n"), done.stderr)
-            self.assertFalse((self.folder / "build/node/.installed-requirements").exists())  # the next run fetches again
+        pinned.write_text(f"./{wheel}\n")  # nothing says what it has to be
+        done = self.up_to_npm(node=None, path=path)
+        self.assertEqual(done.returncode, 1)
+        self.assertTrue(done.stderr.endswith("connect to the internet and run again, or install nodejs and npm\n"), done.stderr)
+        self.assertFalse((self.folder / "build/node/.installed-requirements").exists())  # the next run fetches again
 
     def test_node_and_npm_of_the_machine_are_taken(self):
         done = self.up_to_npm()
