@@ -31,7 +31,6 @@ enum Stream : std::uint64_t { CALIBRATION = 841 };
 
 constexpr float FORCE_SCALE_SD = 0.02F; // of a calibration by a weight
 constexpr std::uint64_t COMMAND_us = 100'000, SETTLED_us = 1'500'000;
-constexpr std::chrono::milliseconds ROUND{1};
 
 class Fingertip {
 public:
@@ -44,7 +43,7 @@ public:
   void run() {
     for (;;) {
       if (pressures_.frozen) {
-        wait_until(host_now() + ROUND);
+        wait_until(host_now() + finger_.round);
         continue;
       }
       look_at_port();
@@ -153,7 +152,7 @@ private:
   }
 
   void look_at_port() {
-    port_.wait(host_now() + ROUND);
+    port_.wait(host_now() + finger_.round);
     if (port_.is_open() != is_open_) {
       is_open_ = port_.is_open();
       if (is_open_) {

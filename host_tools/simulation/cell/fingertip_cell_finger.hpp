@@ -7,6 +7,7 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -51,6 +52,7 @@ struct FingerProcess {
   Pressures gain{};                    // of its sensors, as they are
   std::optional<double> calibrated_sd; // share by which its calibration is off; none: it has none
   bool parallel_bus = false;           // sim_array.h
+  std::chrono::milliseconds round{1};  // the longest that it does not look at its port
 };
 
 // Starts it; it dies with this process, SIGINT is not for it. pressures: in memory that both share.

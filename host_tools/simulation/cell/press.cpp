@@ -19,8 +19,7 @@ namespace {
 enum Stream : std::uint64_t { PLACES = 862 };
 
 constexpr double GRAVITY_m_s2 = 9.80665;
-constexpr std::chrono::milliseconds ROUND{1};
-constexpr std::int64_t ROUND_us = 1'000;
+constexpr std::chrono::milliseconds ROUND{1}, VALIDATED_ROUND{5}; // a validation takes 50 frames a second
 // The twin's placements (twin/episodes.hpp). Each lasts long enough for a calibration to take it.
 constexpr double HALF_WIDTH_mm = 9.0, HALF_LENGTH_mm = 18.0;
 constexpr double RESTS_s = 1.2, SETS_DOWN_s = 0.15, HOLDS_s = 1.5;
@@ -122,15 +121,15 @@ std::string head_of(const PressOptions &options, const std::vector<FingerProcess
 }
 
 // What each round gives, of a host's time and of the time since it began, goes to the fingertips.
-template <typename Round> void run(Fingers &fingers, std::optional<double> seconds, Round round) {
+template <typename Round> void run(Fingers &fingers, std::optional<double> seconds, std::chrono::milliseconds every, Round round) {
   const std::int64_t began_us = steady_now_us();
   std::int64_t last_us = 0;
   double time_s = 0.0;
   while (!interrupted && !(seconds && time_s >= *seconds)) {
-    fingers.share(ROUND);
+    fingers.share(every);
     const std::int64_t now_us = steady_now_us();
     time_s = 1e-6 * static_cast<double>(now_us - began_us);
-    if (now_us - last_us >= ROUND_us) {
+    if (now_us - last_us >= 1000 * every.count()) {
       last_us = now_us;
       fingers.put(now_us, round(now_us, time_s));
       fingers.look();
@@ -158,7 +157,7 @@ void press(const PressOptions &options, const Place &place) {
   if (options.by_hand) {
     std::fprintf(stderr, "press it with the pointer in the page: fingertip web\n");
   }
-  run(fingers, options.seconds, [&](std::int64_t now_us, double time_s) {
+  run(fingers, options.seconds, ROUND, [&](std::int64_t now_us, double time_s) {
     if (hands) {
       hands->step();
     }
@@ -181,13 +180,15 @@ void press(const PressOptions &options, const Place &place) {
 
 void validate(const ValidatedOptions &options, std::optional<double> seconds, const Place &place) {
   std::optional<ValidatedPad> pad(std::in_place, options);
-  Fingers fingers(place, place.fingers(1, options.seed, 0.0, true)); // the pad has its own gains
+  std::vector<FingerProcess> processes = place.fingers(1, options.seed, 0.0, true); // the pad has its own gains
+  processes[0].round = VALIDATED_ROUND;
+  Fingers fingers(place, processes);
   fingers.wait_until_ready();
   place.print_ready(1);
   std::uint32_t rates_set = fingers.rates_set(0);
   bool goes = false;
   double began_s = 0.0;
-  run(fingers, seconds, [&](std::int64_t, double now_s) {
+  run(fingers, seconds, VALIDATED_ROUND, [&](std::int64_t, double now_s) {
     if (!goes && fingers.rates_set(0) != rates_set) {
       goes = true;
       began_s = now_s;
