@@ -23,6 +23,5 @@ foreach(board IN LISTS FINGERTIP_IMAGES)
     BUILD_COMMAND ${CMAKE_COMMAND} --build ${image_dir} ${image_targets}
     INSTALL_COMMAND ""
     BUILD_ALWAYS ON
-    BUILD_BYPRODUCTS ${image_dir}/fingertip-${board}.elf ${image_dir}/fingertip-${board}.bin
-      ${image_dir}/fit_cycles.bin)
+    BUILD_BYPRODUCTS ${image_dir}/fingertip-${board}.elf ${image_dir}/fingertip-${board}.bin)
 endforeach()

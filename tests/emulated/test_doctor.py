@@ -1,6 +1,6 @@
-"""What `fingertip doctor` says of emulated fingertips, each with one thing wrong, and of good ones; on simulated time.
+"""What `fingertip doctor` says of emulated fingertips, each with one thing wrong, and of good ones; on simulated time. Most faults at night.
 
-usage: test_doctor.py --boards FOLDER --support FOLDER --node NODE
+usage: test_doctor.py --boards FOLDER --support FOLDER --node NODE Doctor|Faults
 """
 
 import argparse
@@ -19,7 +19,7 @@ TOOLS = argparse.Namespace()
 BOARDS = ("pico_mux", "pico_parallel")
 
 
-class Doctor(unittest.TestCase):
+class Examined(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
@@ -64,6 +64,8 @@ class Doctor(unittest.TestCase):
         self.assertEqual([finding["verdict"] for finding in found], [verdict], findings)
         return found[0]
 
+
+class Doctor(Examined):
     def test_nothing_is_wrong_with_good_ones(self):
         for board in BOARDS:
             port = self.plug_in(board)
@@ -72,18 +74,6 @@ class Doctor(unittest.TestCase):
             self.assertGreaterEqual(self.result["measured"]["seconds"], 5)
             for sensor in self.result["measured"]["sensors"]:
                 self.assertLess(abs(sensor["noise_Pa"] / self.result["measured"]["expected_noise_Pa"] - 1), 0.1)
-
-    def test_nothing_is_wrong_at_any_oversampling(self):
-        for board in BOARDS:
-            port = self.plug_in(board)
-            for osr in (256, 8192):
-                self.world.tool("set", "--port", port, f"osr={osr}")
-                self.assertEqual(self.examine(port, seconds=2), [], (board, osr))
-
-    def test_sensors_that_are_not_those_of_the_image(self):
-        found = self.only(self.examine(self.plug_in(BOARDS[0], sensor="ms5837_30ba")), "sensors", "bad")
-        self.assertIn("5 kPa at rest", found["text"])
-        self.assertIn("not those of the firmware", found["text"])
 
     def function(self, board, name):
         """Its address."""
@@ -122,6 +112,31 @@ class Doctor(unittest.TestCase):
         self.assertEqual(finding["sensors"], [{"sensor": 7, "strip": 1, "position": 2, "gpio": 7}])
         self.assertIn("GP7 (pin 10)", finding["text"])
 
+    def test_a_port_in_use(self):
+        """A terminal that this process holds."""
+        master, slave = os.openpty()
+        self.addCleanup(os.close, master)
+        self.addCleanup(os.close, slave)
+        fcntl.flock(slave, fcntl.LOCK_EX)
+        findings = self.examine(os.ttyname(slave))
+        self.assertEqual([(finding["check"], finding["verdict"]) for finding in findings], [("port", "bad")])
+        name = pathlib.Path("/proc/self/comm").read_text().strip()
+        self.assertIn(f"in use by another program: {name} (process {os.getpid()})", findings[0]["text"])
+
+
+class Faults(Examined):
+    def test_nothing_is_wrong_at_any_oversampling(self):
+        for board in BOARDS:
+            port = self.plug_in(board)
+            for osr in (256, 8192):
+                self.world.tool("set", "--port", port, f"osr={osr}")
+                self.assertEqual(self.examine(port, seconds=2), [], (board, osr))
+
+    def test_sensors_that_are_not_those_of_the_image(self):
+        found = self.only(self.examine(self.plug_in(BOARDS[0], sensor="ms5837_30ba")), "sensors", "bad")
+        self.assertIn("5 kPa at rest", found["text"])
+        self.assertIn("not those of the firmware", found["text"])
+
     def test_a_dead_multiplexer(self):
         findings = self.examine(self.plug_in("pico_mux", [{"type": "mux_dead", "mux": 1}]))
         finding = self.only(findings, "sensors", "bad")
@@ -154,17 +169,6 @@ class Doctor(unittest.TestCase):
             noise_Pa = [sensor["noise_Pa"] for sensor in self.result["measured"]["sensors"]]
             self.assertAlmostEqual(noise_Pa[11], 39, delta=4)
             self.assertLess(max(noise_Pa[:11]), 4.5)
-
-    def test_a_port_in_use(self):
-        """A terminal that this process holds."""
-        master, slave = os.openpty()
-        self.addCleanup(os.close, master)
-        self.addCleanup(os.close, slave)
-        fcntl.flock(slave, fcntl.LOCK_EX)
-        findings = self.examine(os.ttyname(slave))
-        self.assertEqual([(finding["check"], finding["verdict"]) for finding in findings], [("port", "bad")])
-        name = pathlib.Path("/proc/self/comm").read_text().strip()
-        self.assertIn(f"in use by another program: {name} (process {os.getpid()})", findings[0]["text"])
 
 
 if __name__ == "__main__":

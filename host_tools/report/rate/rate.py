@@ -94,6 +94,7 @@ def by_osr(runs):
 
 def by_sensors(tools, runs):
     """Cycles counted on the chip for each number of sensors, and the rates and latencies at OSR 256 that follow from them."""
+    run("cmake", "--build", tools.boards / PARALLEL, "--target", "sensor_cycles")
     rows = json.loads(run("node", ROOT / "host_tools/report/rate/sensors/sensor_cycles.mjs", tools.boards / PARALLEL))
 
     def cycles(row):

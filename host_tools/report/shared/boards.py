@@ -28,7 +28,7 @@ def image_of(builds, board, suffix="bin"):
 
 
 def fit_cycles_of(builds):
-    """The image that counts the cycles of the fit; every board builds the same."""
+    """The image that counts the cycles of the fit; the fastest builds it."""
     return pathlib.Path(builds) / BOARDS[0] / "fit_cycles.bin"
 
 

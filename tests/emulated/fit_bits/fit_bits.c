@@ -131,8 +131,6 @@ static uint32_t bits_of_shapes(const struct fit_array *array, uint32_t usable, c
   return crc32_iso_hdlc((const uint8_t *)found, sizeof found) ^ crc32_iso_hdlc((const uint8_t *)&state.at, sizeof state.at);
 }
 
-uint32_t fit_bits_presses(enum fit_bits_kernel kernel) { return kernel == FIT_BITS_SHAPES ? 2000 : 10000; /* of that many frames each */ }
-
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   draw_from(UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel);
   draw();

@@ -19,8 +19,5 @@ enum fit_bits_kernel {
 /* Once, before the others. */
 void fit_bits_init(void);
 
-/* So many of them. */
-uint32_t fit_bits_presses(enum fit_bits_kernel kernel);
-
 /* CRC-32 of every byte of the result. */
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press);

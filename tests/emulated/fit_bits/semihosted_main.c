@@ -1,6 +1,8 @@
-/* An image for a machine of QEMU: prints the CRC of each press through semihosting (ARM, "Semihosting for AArch32 and
- * AArch64"), for the kernels that the command line names by their numbers. */
+/* fit_bits KERNEL COUNT (host_main.c) for a machine of QEMU: prints by semihosting (ARM, "Semihosting for AArch32 and AArch64"). */
 #include "fit_bits.h"
+
+#include <stdlib.h>
+#include <string.h>
 
 enum { SYS_WRITE0 = 0x04, SYS_GET_CMDLINE = 0x15, SYS_EXIT = 0x18 };
 #define APPLICATION_EXIT 0x20026u
@@ -30,11 +32,11 @@ int main(void) {
   } command = {line, sizeof line};
   call_host(SYS_GET_CMDLINE, &command);
   fit_bits_init();
-  for (const char *c = line; *c; c++) {
-    enum fit_bits_kernel kernel = (enum fit_bits_kernel)(*c - '0');
-    for (uint32_t press = 0; *c >= '0' && *c <= '9' && press < fit_bits_presses(kernel); press++) {
-      print_hex(fit_bits_of(kernel, press));
-    }
+  char *word = strchr(line, ' ');
+  const enum fit_bits_kernel kernel = (enum fit_bits_kernel)strtoul(word, &word, 10);
+  const uint32_t count = strtoul(word, NULL, 10);
+  for (uint32_t press = 0; press < count; press++) {
+    print_hex(fit_bits_of(kernel, press));
   }
   call_host(SYS_EXIT, (const void *)APPLICATION_EXIT);
   return 0;

@@ -1,21 +1,47 @@
-"""The report on rate and cost in its short form: every figure is there, agrees with the others, and comes out the same again.
+"""The report on rate and cost in its short form, at night: every figure is there and agrees with the others. By day one of its measurements.
 
-usage: test_rate.py --build BUILD --boards BOARDS
+usage: test_rate.py --build BUILD --boards BOARDS Measurement|Rate
 """
 
 import pathlib
 import sys
+import tempfile
+import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/rate"), str(ROOT / "tests/support")]
 import rate  # noqa: E402, adds the path of the next
 import emulated  # noqa: E402
 import report_case  # noqa: E402
-import scenes  # noqa: E402
 
 FIGURES = """parallel_fps_osr256 parallel_fps_osr1024 mux_fps_osr256 mux_fps_osr1024 latency_parallel_us latency_parallel_median_us
     latency_parallel_p99_us latency_parallel_p99_9_us latency_parallel_max_us idle_sleep_percent contact_sleep_percent flash_bytes
     ram_bytes code_in_sram_bytes stack_bytes raw_flash_bytes dropped""".split()
+
+
+def assert_sound(case, row):
+    """Of by_osr."""
+    case.assertEqual(row["dropped"], 0)
+    case.assertLess(row["fitted_per_s"] + row["held_per_s"], 1e6 / emulated.CONVERSION_us[row["osr"]])
+    case.assertLess(row["held_per_s"], 0.05 * row["frames_per_s"])
+    for times in (row["latency_us"], row["delivery_us"]):
+        course = [times[name] for name in ("median", "p99", "p99_9", "max")]
+        case.assertEqual(course, sorted(course))
+    case.assertLess(row["latency_us"]["max"], row["delivery_us"]["max"])
+    if row["board"] == "pico_parallel":  # what the latencies count from
+        case.assertLess(abs(row["convert_us"] - 20 - emulated.CONVERSION_us[row["osr"]] * emulated.MARGIN), 20)
+    case.assertGreater(row["latency_us"]["median"], row["read_us"] + row["condition_us"] + row["fit_us"])
+
+
+class Measurement(unittest.TestCase):
+    def test_it_is_sound_and_comes_out_the_same_again(self):
+        """Emulated cycles and times, to the last one."""
+        tools, board = emulated.Tools(report_case.OPTIONS.build, report_case.OPTIONS.boards), rate.PARALLEL
+        folders = [self.enterContext(tempfile.TemporaryDirectory()) for _ in range(2)]
+        path = emulated.scenario(folders[0], "wander", 3)
+        once, again = (rate.by_osr({(board, 1024): emulated.Measurement(tools, folder, board, 1024, path, 1)}) for folder in folders)
+        self.assertEqual(once, again)
+        assert_sound(self, *once)
 
 
 class Rate(report_case.ReportCase):
@@ -37,16 +63,7 @@ class Rate(report_case.ReportCase):
             self.assertEqual(self.found[name], 0, name)
         self.assertEqual(self.found["fit_iterations"], 4)
         for row in self.found["by_osr"]:
-            self.assertEqual(row["dropped"], 0)
-            self.assertLess(row["fitted_per_s"] + row["held_per_s"], 1e6 / emulated.CONVERSION_us[row["osr"]])
-            self.assertLess(row["held_per_s"], 0.05 * row["frames_per_s"])
-            for times in (row["latency_us"], row["delivery_us"]):
-                course = [times[name] for name in ("median", "p99", "p99_9", "max")]
-                self.assertEqual(course, sorted(course))
-            self.assertLess(row["latency_us"]["max"], row["delivery_us"]["max"])
-            if row["board"] == "pico_parallel":  # what the latencies count from
-                self.assertLess(abs(row["convert_us"] - 20 - emulated.CONVERSION_us[row["osr"]] * emulated.MARGIN), 20)
-            self.assertGreater(row["latency_us"]["median"], row["read_us"] + row["condition_us"] + row["fit_us"])
+            assert_sound(self, row)
 
     def test_two_ways_of_counting_agree(self):
         """Cycles of the whole chip, frames of the stream; cycles and frames of the stage meter."""
@@ -79,17 +96,6 @@ class Rate(report_case.ReportCase):
             self.assertEqual(fits, sorted(fits))
             self.assertLess(max(row["error_um"] for row in rows), 1)
         self.assertEqual({row["sensors"] for row in self.found["by_sensors"]} & {5, 15, 32}, {5, 15, 32})
-
-    def test_the_same_again(self):
-        """Emulated cycles and times, to the last one."""
-        tools = scenes.SceneTools(report_case.OPTIONS.build, report_case.OPTIONS.boards, "slip", ("pico_mux",))
-        path = emulated.scenario(self.folder, "wander", 4)
-
-        again = emulated.Measurement(tools, self.folder, "pico_mux", 1024, path, 1)
-        row = next(row for row in self.found["by_osr"] if (row["board"], row["osr"]) == ("pico_mux", 1024))
-        self.assertEqual(row["sleep_percent"], again.sleep_percent)
-        self.assertEqual(row["latency_us"], emulated.distribution(again.offered_us))
-        self.assertEqual(row["delivery_us"], emulated.distribution(again.delivered_us))
 
     def test_text_and_picture(self):
         for name in ("rate.png", "scenes.png"):
