@@ -14,7 +14,7 @@ import shapes  # noqa: E402
 from contacts import Contacts  # noqa: E402
 from figures import assert_within  # noqa: E402
 
-# (key, least, most): what a full run finds on seed 40000, of edges on 5000, with room for a tenth of its pads.
+# (key, least, most): what a full run finds on seed 40000, of edges on 5000, with room for few pads.
 FOUND = (
     ("two_right_percent_8mm", 27, 100),
     ("two_right_percent_12mm", 94, 100),
@@ -34,7 +34,7 @@ FOUND = (
 class TwoShapes(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.found = shapes.figures(Contacts(BUILD), seed=3, pads=20) | edges.figures(Contacts(BUILD), seed=3, pads=4)
+        cls.found = shapes.figures(Contacts(BUILD), seed=3, pads=10) | edges.figures(Contacts(BUILD), seed=3, pads=4)
 
     def test_figures(self):
         assert_within(self, self.found, FOUND)
@@ -42,7 +42,7 @@ class TwoShapes(unittest.TestCase):
     def test_every_touch_is_called_something(self):
         for row in self.found["touches"]:
             with self.subTest(row["case"]):
-                self.assertEqual(row["touches"], 400)
+                self.assertEqual(row["touches"], 200)
                 called = sum(row[name] for name in ("one", "pulled", "long", "two", "none", "undecided"))
                 self.assertAlmostEqual(called, 100, places=6)
                 self.assertEqual(row["undecided"], 0)
