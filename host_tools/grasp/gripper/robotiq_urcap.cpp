@@ -1,7 +1,8 @@
 #include "grasp/gripper/robotiq_urcap.hpp"
 
+#include "libfingertip/text.hpp"
+
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <netdb.h>
 #include <poll.h>
@@ -13,9 +14,8 @@ using namespace robotiq;
 
 constexpr const char *PORT = "63352";
 constexpr double POLL_s = 0.02;
-constexpr int RESET_READS = 50;
+constexpr int RESET_READS = 50, LARGEST = 255;
 constexpr std::chrono::milliseconds PAUSE{20};
-constexpr int LARGEST = 255;
 
 RobotiqUrcap::RobotiqUrcap(const GripperWay &given) : way_(complete_way(given)), traits_(gripper_traits(given.model)) {
   if (given.slave != 0) {
@@ -78,17 +78,12 @@ std::string RobotiqUrcap::ask(const std::string &line) {
 
 int RobotiqUrcap::get(const std::string &name) {
   const std::string answer = ask("GET " + name);
-  const std::size_t head = name.size() + 1;
-  int value = -1;
-  if (answer.rfind(name + " ", 0) == 0) {
-    const auto [end, failed] = std::from_chars(answer.data() + head, answer.data() + answer.size(), value);
-    value = failed == std::errc() && end == answer.data() + answer.size() && value <= LARGEST ? value : -1;
-  }
-  if (value < 0) {
+  const auto value = answer.rfind(name + " ", 0) == 0 ? to_i64(std::string_view(answer).substr(name.size() + 1)) : std::nullopt;
+  if (!value || *value < 0 || *value > LARGEST) {
     doubtful_ = true;
     throw Error(ErrorCode::gripper_garbled, way_.port + ": no answer to GET " + name);
   }
-  return value;
+  return static_cast<int>(*value);
 }
 
 void RobotiqUrcap::set(const std::string &values) {

@@ -224,9 +224,8 @@ public:
                         {"trouble", trouble_},          {"slips", slips_.slips.size()}};
     out["slip"] = slips_.slips.empty() ? ordered_json(nullptr) : answer_to(slips_.slips.front());
     for (std::size_t f = 0; f < fingers_.size(); f++) {
-      ordered_json one = {{"frames", frames_[f]}, {"loads", loads_[f]}}; // loads: frames that report one
-      one.update(fingers_[f].line_summary());
-      out["fingers"].push_back(one);
+      out["fingers"].push_back({{"frames", frames_[f]}, {"loads", loads_[f]}}); // loads: frames that report one
+      out["fingers"].back().update(fingers_[f].line_summary());
     }
     return out;
   }

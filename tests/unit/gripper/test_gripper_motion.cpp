@@ -14,6 +14,11 @@ static void run(GripperMotion &motion, double seconds) {
   }
 }
 
+static void run(GripperMotion &motion, const GripperMove &move, double seconds) {
+  motion.move(move);
+  run(motion, seconds);
+}
+
 static GripperMotion activated(const char *model) {
   GripperMotion motion(gripper_mechanics(model));
   motion.activate();
@@ -30,8 +35,7 @@ static auto spring(double width_mm, double stiffness_N_mm) {
 
 TEST(GripperMotion, MovesOnlyOnceActivated) {
   GripperMotion motion(gripper_mechanics("2f85"));
-  motion.move({.width_mm = 10, .speed_mm_s = 150, .force_N = 20});
-  run(motion, 1.0);
+  run(motion, {.width_mm = 10, .speed_mm_s = 150, .force_N = 20}, 1.0);
   EXPECT_FALSE(motion.active());
   EXPECT_EQ(motion.width_mm(), 85.0);
 
@@ -53,8 +57,7 @@ TEST(GripperMotion, BeginsAfterItsLatencyAndRunsAtItsSpeed) {
     GripperMotion motion = activated(model);
     const GripperTraits &traits = motion.mechanics().traits;
     const double begin_mm = motion.reported_width_mm();
-    motion.move({.width_mm = 30, .speed_mm_s = 50});
-    run(motion, traits.latency_s);
+    run(motion, {.width_mm = 30, .speed_mm_s = 50}, traits.latency_s);
     EXPECT_EQ(motion.reported_width_mm(), begin_mm) << model;
     run(motion, 0.1);
     EXPECT_NEAR(motion.reported_width_mm(), begin_mm - 5, traits.step_mm / 2 + 0.051) << model;
@@ -68,41 +71,34 @@ TEST(GripperMotion, BeginsAfterItsLatencyAndRunsAtItsSpeed) {
 
 TEST(GripperMotion, SpeedsStayWithinItsLimits) {
   GripperMotion motion = activated("2f85");
-  motion.move({.width_mm = 0, .speed_mm_s = 1});
-  run(motion, 1.025);
+  run(motion, {.width_mm = 0, .speed_mm_s = 1}, 1.025);
   EXPECT_NEAR(motion.width_mm(), 85 - 20, 0.05);
-  motion.move({.width_mm = 85, .speed_mm_s = 1e9});
-  run(motion, 0.125);
+  run(motion, {.width_mm = 85, .speed_mm_s = 1e9}, 0.125);
   EXPECT_NEAR(motion.width_mm(), 85 - 20 - 0.025 * 20 + 15, 0.05);
 }
 
 TEST(GripperMotion, IgnoresMovesShorterThanItsDeadband) {
   GripperMotion motion = activated("2f85");
   const double one_mm = motion.mechanics().traits.step_mm;
-  motion.move({.width_mm = 85 - 100 * one_mm, .speed_mm_s = 150});
-  run(motion, 1.0);
+  run(motion, {.width_mm = 85 - 100 * one_mm, .speed_mm_s = 150}, 1.0);
   const double stands_mm = motion.width_mm();
-  motion.move({.width_mm = stands_mm - one_mm, .speed_mm_s = 150});
-  run(motion, 0.5);
+  run(motion, {.width_mm = stands_mm - one_mm, .speed_mm_s = 150}, 0.5);
   EXPECT_EQ(motion.width_mm(), stands_mm);
   EXPECT_FALSE(motion.moving());
-  motion.move({.width_mm = stands_mm - 2 * one_mm, .speed_mm_s = 150});
-  run(motion, 0.5);
+  run(motion, {.width_mm = stands_mm - 2 * one_mm, .speed_mm_s = 150}, 0.5);
   EXPECT_NEAR(motion.width_mm(), stands_mm - 2 * one_mm, 1e-9);
 }
 
 TEST(GripperMotion, StopsWhereTheForceIsReached) {
   GripperMotion motion = activated("2f85");
   motion.blocked_at = spring(40, 10);
-  motion.move({.width_mm = 0, .speed_mm_s = 100, .force_N = 30});
-  run(motion, 1.0);
+  run(motion, {.width_mm = 0, .speed_mm_s = 100, .force_N = 30}, 1.0);
   EXPECT_NEAR(motion.width_mm(), 37, 0.01);
   EXPECT_FALSE(motion.moving());
   EXPECT_EQ(motion.status().object, true);
   EXPECT_EQ(motion.blocked(), -1);
 
-  motion.move({.width_mm = 0, .speed_mm_s = 100, .force_N = 60});
-  run(motion, 0.5);
+  run(motion, {.width_mm = 0, .speed_mm_s = 100, .force_N = 60}, 0.5);
   EXPECT_NEAR(motion.width_mm(), 34, 0.01);
   /* What yields is followed, */
   motion.blocked_at = spring(20, 10);
@@ -117,11 +113,9 @@ TEST(GripperMotion, StopsWhereTheForceIsReached) {
 
 TEST(GripperMotion, FeelsWhatIsAroundItWhileItOpens) {
   GripperMotion motion = activated("2f85");
-  motion.move({.width_mm = 10, .speed_mm_s = 150});
-  run(motion, 1.0);
+  run(motion, {.width_mm = 10, .speed_mm_s = 150}, 1.0);
   motion.blocked_at = [](double width_mm, double force_N) { return force_N < 0 && width_mm > 50; };
-  motion.move({.width_mm = 85, .speed_mm_s = 150, .force_N = 20});
-  run(motion, 1.0);
+  run(motion, {.width_mm = 85, .speed_mm_s = 150, .force_N = 20}, 1.0);
   EXPECT_NEAR(motion.width_mm(), 50, 0.01);
   EXPECT_EQ(motion.blocked(), 1);
 }
@@ -129,15 +123,12 @@ TEST(GripperMotion, FeelsWhatIsAroundItWhileItOpens) {
 TEST(GripperMotion, FingersLagByTheBacklash) {
   GripperMotion motion = activated("sts3215");
   const double half_mm = motion.mechanics().backlash_mm / 2;
-  motion.move({.width_mm = 40, .speed_mm_s = 100});
-  run(motion, 1.0);
+  run(motion, {.width_mm = 40, .speed_mm_s = 100}, 1.0);
   EXPECT_NEAR(motion.width_mm(), motion.reported_width_mm() + half_mm, 0.08);
   const double closed_mm = motion.width_mm();
-  motion.move({.width_mm = 40.5, .speed_mm_s = 100});
-  run(motion, 1.0);
+  run(motion, {.width_mm = 40.5, .speed_mm_s = 100}, 1.0);
   EXPECT_EQ(motion.width_mm(), closed_mm);
-  motion.move({.width_mm = 60, .speed_mm_s = 100});
-  run(motion, 1.0);
+  run(motion, {.width_mm = 60, .speed_mm_s = 100}, 1.0);
   EXPECT_NEAR(motion.width_mm(), motion.reported_width_mm() - half_mm, 0.08);
 
   /* What presses on them takes it up. */
@@ -149,8 +140,7 @@ TEST(GripperMotion, FingersLagByTheBacklash) {
 TEST(GripperMotion, ACommandCountsAfterItsOwnLatency) {
   GripperMotion motion = activated("2f85");
   for (int i = 0; i < 100; i++) {
-    motion.move({.width_mm = 85 - 0.5 * (i + 1), .speed_mm_s = 150});
-    run(motion, 0.005);
+    run(motion, {.width_mm = 85 - 0.5 * (i + 1), .speed_mm_s = 150}, 0.005);
   }
   /* Twenty-five milliseconds behind: five commands. */
   EXPECT_NEAR(motion.width_mm(), 85 - 0.5 * 95, 0.75);
@@ -159,8 +149,7 @@ TEST(GripperMotion, ACommandCountsAfterItsOwnLatency) {
 TEST(GripperMotion, ActivationDropsWhatIsHeld) {
   GripperMotion motion = activated("2f85");
   motion.blocked_at = spring(40, 10);
-  motion.move({.width_mm = 0, .speed_mm_s = 100, .force_N = 30});
-  run(motion, 1.0);
+  run(motion, {.width_mm = 0, .speed_mm_s = 100, .force_N = 30}, 1.0);
   motion.activate();
   run(motion, motion.mechanics().activation_s / 3 - 0.01);
   EXPECT_EQ(motion.width_mm(), 85.0);
@@ -168,12 +157,10 @@ TEST(GripperMotion, ActivationDropsWhatIsHeld) {
 
 TEST(GripperMotion, WithoutPowerTheFingersStay) {
   GripperMotion motion = activated("2f85");
-  motion.move({.width_mm = 0, .speed_mm_s = 100});
-  run(motion, 0.2);
+  run(motion, {.width_mm = 0, .speed_mm_s = 100}, 0.2);
   const double stands_mm = motion.width_mm();
   motion.power_off();
-  motion.move({.width_mm = 0, .speed_mm_s = 100});
-  run(motion, 1.0);
+  run(motion, {.width_mm = 0, .speed_mm_s = 100}, 1.0);
   EXPECT_EQ(motion.width_mm(), stands_mm);
   EXPECT_FALSE(motion.status().active);
 }
@@ -182,15 +169,13 @@ TEST(GripperMotion, TheSameCommandAgainIsNone) {
   GripperMotion motion = activated("2f85");
   motion.blocked_at = spring(40, 10);
   const GripperMove grip = {.width_mm = 0, .speed_mm_s = 100, .force_N = 30};
-  motion.move(grip);
-  run(motion, 1.0);
+  run(motion, grip, 1.0);
   motion.move(grip);
   EXPECT_FALSE(motion.moving());
   EXPECT_EQ(motion.status().object, true);
   motion.move({.width_mm = 85, .speed_mm_s = 100, .force_N = 30});
   EXPECT_TRUE(motion.moving());
-  motion.move(grip);
-  run(motion, 1.0);
+  run(motion, grip, 1.0);
   EXPECT_EQ(motion.status().object, true);
 }
 
