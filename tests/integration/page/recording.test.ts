@@ -85,15 +85,33 @@ test('what the page and the tool recorded is read back, packet by packet', async
   assert.deepEqual(frames(await itemsOf('own.mcap', recorded('mcap'))), wanted);
   assert.deepEqual(frames(await itemsOf('tool.mcap', readFileSync(path('tool.mcap')))), wanted);
   assert.deepEqual(frames(await itemsOf('a.ftr', wanted)), wanted);
-  const replay = new Replay(new File([new Uint8Array(csv)], 'own.csv') as unknown as globalThis.File);
-  let bytes = 0;
-  replay.paused = true;
-  const receive = (part: Uint8Array): void => void (bytes += part.length);
-  replay.onLine = (line) => void line.open(receive, () => undefined);
+});
+
+test('a replay keeps its pace, waits, skips and hands out everything', async (t) => {
+  const replay = new Replay(new File([new Uint8Array(recorded('csv'))], 'own.csv') as unknown as globalThis.File);
+  let [now_ms, bytes, ended] = [0, 0, ''];
+  const ticks: (() => void)[] = [];
+  t.mock.method(performance, 'now', () => now_ms);
+  t.mock.method(globalThis, 'setTimeout', (tick: () => void) => ticks.push(tick));
+  const receive = ({ length }: Uint8Array): void => void (bytes += length);
+  replay.onLine = (line) => void line.open(receive, (why) => (ended = why));
+  const after = async (ms: number, change: Partial<Replay> = {}): Promise<string> => {
+    Object.assign(replay, change);
+    now_ms += ms;
+    for (ticks.pop()?.(); ticks.length === 0 && !ended; ) {
+      await new Promise(setImmediate);
+    }
+    return replay.seconds.toFixed(2);
+  };
   await replay.start();
+  assert.equal(await after(40), '0.04');
+  assert.equal(await after(40, { speed: 3 }), '0.16');
+  assert.equal(await after(20, { paused: true }), '0.16');
+  replay.skip(0.1);
+  assert.equal(await after(0), '0.26');
   replay.skip(10);
-  assert.equal(await new Promise((ended) => (replay.onEnd = ended)), '');
-  assert.equal(bytes, wanted.length);
+  await after(0);
+  assert.deepEqual([ended, bytes], ['the replay has ended', frames(packets).length]);
 });
 
 test('torn and foreign files: a sentence, and what came before', async () => {
@@ -108,6 +126,7 @@ test('torn and foreign files: a sentence, and what came before', async () => {
     ['cut.csv', text([...lines.slice(0, row), '']), /no end line/, true],
     ['later.csv', text(['# fingertip-recording 3', ...lines.slice(1)]), /format "3" is unknown.*use the page of that version/, false],
     ['torn.mcap', mcap.subarray(0, (2 * mcap.length) / 3), /the last chunk is torn/, false], // of two: the head's, and that of all rows
+    ['noise.ftr', Buffer.alloc(500), /holds no packet/, false],
     ['damaged.ftr', damaged, /has 1 damaged packets, which are left out/, true],
   ] as const) {
     const before: DevicePacket[] = [];

@@ -9,6 +9,7 @@ import { History } from '../../../host_tools/web/src/model/history';
 import { Buckets, Trust, intervalOf, roundAbove } from '../../../host_tools/web/src/view/buckets';
 import { cameraOf, picked, seen, type Point } from '../../../host_tools/web/src/view/camera';
 import { chartOf, clock, spansOf, ticksOf } from '../../../host_tools/web/src/view/curves';
+import { leaving } from '../../../host_tools/web/src/view/notices';
 import { contactAt, trailAt } from '../../../host_tools/web/src/view/recorded_contact';
 import { sceneOf } from '../../../host_tools/web/src/view/pad_scene';
 import { HEAT_STOPS, contrast, paletteOf, parsed } from '../../../host_tools/web/src/view/palette';
@@ -250,6 +251,12 @@ test('readers of the screen are told what begins, ends and changes, no faster th
   assert.match(speech.sentence(slips, 'live', 80_000) ?? '', /^Slips; .*round/);
   assert.equal(speech.sentence(slips, 'live', 90_000), null);
   assert.equal(speech.sentence(contactOf({ flags: Flag.TARED }), 'live', 100_000), 'No contact.');
+});
+
+test('of plain notices three stay, and every fault', () => {
+  const isPlain = (text: string) => text !== 'fault';
+  assert.deepEqual(leaving(['fault', 'a', 'b', 'fault', 'c'], isPlain), []);
+  assert.deepEqual(leaving(['a', 'fault', 'b', 'c', 'fault', 'd', 'e'], isPlain), ['a', 'b']);
 });
 
 const LAYOUT = { x_mm: [-9, 0, 9], y_mm: [0, 0, 0] };

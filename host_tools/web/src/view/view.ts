@@ -9,6 +9,7 @@ import type { History } from '../model/history';
 import { button, element, write } from './elements';
 import { HealthPanel } from './health';
 import { factsOf } from './health_facts';
+import { leaving } from './notices';
 import { Numbers } from './numbers';
 import { PadCard } from './pad_card';
 import { Shown } from './shown';
@@ -37,7 +38,6 @@ const TRACES_INTERVAL_ms = 33;
 const TEXT_INTERVAL_ms = 125;
 const HEALTH_INTERVAL_ms = 500;
 const NOTICE_ms = 20000;
-const NOTICES_MOST = 3;
 
 export class View {
   /** Pictures drawn so far. */
@@ -124,12 +124,12 @@ export class View {
     this.textAt_ms = this.healthAt_ms = -Infinity;
   }
 
-  /** A sentence that stays until it is closed. */
+  /** A sentence that stays until it is closed; a plain one leaves by itself. */
   notice(text: string, level: 'plain' | 'bad' = 'plain'): void {
     const notice = element('div', { class: `notice ${level}` }, element('p', {}, text));
     notice.append(button('Close', () => notice.remove(), { class: 'small' }));
     this.notices.append(notice);
-    [...this.notices.children].slice(0, -NOTICES_MOST).forEach((each) => each.remove());
+    leaving([...this.notices.children], (each) => each.classList.contains('plain')).forEach((each) => each.remove());
     setTimeout(() => level === 'plain' && notice.remove(), NOTICE_ms);
   }
 
