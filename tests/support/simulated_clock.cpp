@@ -1,6 +1,7 @@
 // libfingertip's clock, simulated: programs that are linked with this one instead live on the time of a time keeper (time_keeper.cpp),
 // whose socket the environment names. One thread of all those programs runs at a time; time passes only while all of them wait.
 #include "libfingertip/clock.hpp"
+#include "libfingertip/descriptor_transport.hpp"
 #include "support/time_keeper.hpp"
 
 #include <atomic>
@@ -36,12 +37,10 @@ std::atomic<int> looks{0};
 
 int connected() {
   const char *path = std::getenv(test::KEEPER_VARIABLE);
-  sockaddr_un address = {};
-  address.sun_family = AF_UNIX;
-  if (path == nullptr || std::strlen(path) >= sizeof address.sun_path) {
+  sockaddr_un address;
+  if (path == nullptr || !unix_address(path, &address)) {
     fail(test::KEEPER_VARIABLE);
   }
-  std::strcpy(address.sun_path, path);
   const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
   if (fd < 0 || connect(fd, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0) {
     fail(path);

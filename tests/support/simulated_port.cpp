@@ -1,14 +1,12 @@
 // libfingertip's served port where time is simulated: a socket, whose bytes are there for the other
 // end the moment they are written. SerialTransport opens it by its path.
-#include "libfingertip/error.hpp"
+#include "libfingertip/descriptor_transport.hpp"
 #include "libfingertip/served_port.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
-#include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <fcntl.h>
 #include <linux/sockios.h>
 #include <sys/ioctl.h>
@@ -18,8 +16,6 @@
 #include <utility>
 
 namespace fingertip {
-
-static Error failure(const std::string &what) { return Error(ErrorCode::cannot_open, what + " (" + std::strerror(errno) + ")"); }
 
 static std::string own_name() {
   static std::atomic<unsigned> number{0};
@@ -42,25 +38,13 @@ ServedPort::~ServedPort() {
 }
 
 void ServedPort::make_raw() {
-  sockaddr_un address = {};
-  address.sun_family = AF_UNIX;
-  if (path_.size() >= sizeof address.sun_path) {
-    errno = ENAMETOOLONG;
-    throw failure(path_);
-  }
-  std::memcpy(address.sun_path, path_.data(), path_.size());
+  sockaddr_un address;
   unlink(path_.c_str());
   listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (listener_ < 0 || bind(listener_, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 || listen(listener_, 8) != 0) {
+  if (!unix_address(path_, &address) || bind(listener_, reinterpret_cast<const sockaddr *>(&address), sizeof address) != 0 ||
+      listen(listener_, 8) != 0) {
     throw failure(path_);
   }
-}
-
-void ServedPort::rename(const std::string &link) {
-  if (std::rename(link_.c_str(), link.c_str()) != 0) {
-    throw failure(link);
-  }
-  path_ = link_ = link;
 }
 
 void ServedPort::look() {

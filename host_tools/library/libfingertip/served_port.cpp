@@ -1,12 +1,7 @@
 #include "libfingertip/served_port.hpp"
 
-#include "libfingertip/error.hpp"
-
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <fcntl.h>
 #include <sys/ioctl.h>
 #include <termios.h>
@@ -16,8 +11,6 @@ namespace fingertip {
 
 /* Nothing can be waited for on a terminal that no program has open: it has to be asked. */
 constexpr std::chrono::milliseconds LOOK_INTERVAL{2};
-
-static Error failure(const std::string &what) { return Error(ErrorCode::cannot_open, what + " (" + std::strerror(errno) + ")"); }
 
 ServedPort::ServedPort(const std::string &link) : link_(link) {
   char name[64];
@@ -58,13 +51,6 @@ void ServedPort::make_raw() {
   cfmakeraw(&settings);
   tcsetattr(slave, TCSANOW, &settings);
   ::close(slave);
-}
-
-void ServedPort::rename(const std::string &link) {
-  if (std::rename(link_.c_str(), link.c_str()) != 0) {
-    throw failure(link);
-  }
-  path_ = link_ = link;
 }
 
 void ServedPort::look() {

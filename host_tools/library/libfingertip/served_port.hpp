@@ -6,6 +6,7 @@
 #pragma once
 
 #include "libfingertip/clock.hpp"
+#include "libfingertip/error.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -39,6 +40,7 @@ public:
   unsigned speed() const;
 
 private:
+  static Error failure(const std::string &what); /* with errno's text */
   void look();
   void make_raw();
 

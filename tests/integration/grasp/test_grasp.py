@@ -7,7 +7,6 @@ import contextlib
 import itertools
 import os
 import pathlib
-import resource
 import signal
 import socket
 import subprocess
@@ -21,6 +20,7 @@ PLOT_PATIENCE_s = 300
 PYTHON_TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"
 sys.path[:0] = [str(PYTHON_TOOLS), str(pathlib.Path(__file__).resolve().parents[2] / "support")]
 from fingertip import files, grip_file  # noqa: E402
+from small_disk import disk_of  # noqa: E402
 from simulated_terminal import Terminal  # noqa: E402
 from world_case import WorldCase  # noqa: E402
 
@@ -366,12 +366,8 @@ class Trouble(GraspTest):
         self.assertNotIn("fault", set(self.rows()["state"]))
 
     def test_a_full_disk_ends_the_recording_and_not_the_grasp(self):
-        def limit():
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (600000, 600000))
-
         with self.cell():
-            process = self.start("-o", self.csv, preexec_fn=limit)
+            process = self.start("-o", self.csv, preexec_fn=disk_of(600000))
             self.until_state(process, "holding")
             self.told(process, "not recorded any more")
             self.tell("load 2")

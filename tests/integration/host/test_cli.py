@@ -373,9 +373,8 @@ class Commands(CliTest):
 
     def test_refusal(self):
         with self.device("refuse=1"):
-            self.assertIn(
-                "not tared, it reports a contact of 5.00 N; let go of the pad, or --force", self.error("tare", "--port", self.port)
-            )
+            err = self.error("tare", "--port", self.port)
+            self.assertIn("not tared, it reports a contact of 5.00 N; let go of the pad, or --force", err)
             self.assertIn('refused "rate": not possible now', self.error("set", "rate=100", "--port", self.port))
 
     def test_no_answer_can_be_interrupted(self):

@@ -72,40 +72,30 @@ class Flash(CliTest):
         os.chmod(self.volume, 0o777)
         with self.device():
             err = self.without_permission("flash", self.image, "--volume", self.volume, status=0)
-        self.assertEqual(
-            err, f"writing 9.8.7 abcdef012345 for pico_mux\nwritten, and it came back; its version was not read: {self.port}: {self.RULE}\n"
-        )
+        said = f"written, and it came back; its version was not read: {self.port}: {self.RULE}\n"
+        self.assertEqual(err, f"writing 9.8.7 abcdef012345 for pico_mux\n{said}")
         self.assert_written()
 
     def test_another_version_came_back(self):
-        self.assertIn(
-            "came back with firmware 1.20.3 0123456789ab+ instead of 9.8.7 abcdef012345; unplug the Pico, hold its BOOTSEL",
-            self.flash(after=(), status=1)[1],
-        )
+        err = self.flash(after=(), status=1)[1]
+        self.assertIn("came back with firmware 1.20.3 0123456789ab+ instead of 9.8.7 abcdef012345; unplug the Pico, hold its BOOTSEL", err)
 
     def test_another_board_is_refused_before_anything_happens(self):
-        self.assertIn(
-            "for board pico_mux, but fingertip E660583883265A2C is a pico_parallel; give fingertip-pico_parallel.uf2",
-            self.flash("board=pico_parallel", status=1)[1],
-        )
+        err = self.flash("board=pico_parallel", status=1)[1]
+        self.assertIn("for board pico_mux, but fingertip E660583883265A2C is a pico_parallel; give fingertip-pico_parallel.uf2", err)
         self.assertFalse(os.path.exists(self.volume))
 
     def test_nothing_there_says_what_to_press(self):
         del self.environment["FINGERTIP_PORT"]
         self.assertIn("unplug the Pico, hold its BOOTSEL button while plugging it in", self.error("flash", self.image))
         self.make_volume(board="RP2350")
-        self.assertIn(
-            "another chip (RP2350); there is no firmware for a Pico 2 yet, take a Pico",
-            self.error("flash", self.image, "--volume", self.volume),
-        )
+        err = self.error("flash", self.image, "--volume", self.volume)
+        self.assertIn("another chip (RP2350); there is no firmware for a Pico 2 yet, take a Pico", err)
 
     def test_a_folder_that_is_no_boot_volume_is_refused_before_anything_happens(self):
         with self.device("loader=1") as device:
-            self.assertEqual(
-                self.error("flash", self.image, "--volume", self.folder),
-                f"fingertip: {self.folder}: no RP2040 boot volume (no INFO_UF2.TXT); "
-                "leave out --volume, or give that of the drive RPI-RP2\n",
-            )
+            why = "no RP2040 boot volume (no INFO_UF2.TXT); leave out --volume, or give that of the drive RPI-RP2"
+            self.assertEqual(self.error("flash", self.image, "--volume", self.folder), f"fingertip: {self.folder}: {why}\n")
             self.assertIsNone(device.poll())
         self.assertFalse(os.path.exists(os.path.join(self.folder, "fingertip.uf2")))
 

@@ -2,19 +2,13 @@
 
 import os
 import pathlib
-import resource
 import signal
 import sys
 import unittest
 
 from cli_case import CliTest
 from fingertip import files
-
-
-def limit():
-    """For a process whose files may have 20 kB."""
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+from small_disk import disk_of
 
 
 class Recording(CliTest):
@@ -194,7 +188,7 @@ class LiveData(CliTest):
             (f"record - --raw-bytes {self.ftr}", self.ftr),
         ):
             with self.device():
-                _, err = self.run_cli(*command.split(), "--overwrite", "--port", self.port, status=1, preexec_fn=limit)
+                _, err = self.run_cli(*command.split(), "--overwrite", "--port", self.port, status=1, preexec_fn=disk_of(20000))
             why = "No space left on device" if full == "/dev/full" else "File too large"
             self.assertRegex(err.splitlines()[-1], rf"^fingertip: {full}: {why}; .*(make room and start a new file|--salvage)$")
         for path in (self.csv, self.ftr):
@@ -203,7 +197,7 @@ class LiveData(CliTest):
     def test_a_file_it_is_appended_to_keeps_what_it_had(self):
         pathlib.Path(self.csv).write_text("precious\n", encoding="utf-8")
         with self.device(), open(self.csv, "a", encoding="utf-8") as file:
-            self.run_cli("record", "-", "--port", self.port, status=1, stdout=file, preexec_fn=limit)
+            self.run_cli("record", "-", "--port", self.port, status=1, stdout=file, preexec_fn=disk_of(20000))
         self.assertIn("precious\n# fingertip-recording 1\n", pathlib.Path(self.csv).read_text(encoding="utf-8"))
 
 
@@ -235,7 +229,7 @@ class Replay(CliTest):
         part = ("convert", self.csv, self.folder + "/c.csv", "--from", "1000", "--to", "1001")
         self.assertIn("r.csv: no frames from --from to --to", self.error(*part))
         # a disk that is full in the middle
-        _, err = self.run_cli("convert", self.ftr, self.csv, "--overwrite", status=1, preexec_fn=limit)
+        _, err = self.run_cli("convert", self.ftr, self.csv, "--overwrite", status=1, preexec_fn=disk_of(20000))
         self.assertIn("nothing was changed", err)
         self.assertEqual(pathlib.Path(self.csv).read_bytes(), before)
         self.assertEqual(sorted(os.listdir(self.folder)), ["r.csv", "r.ftr"])

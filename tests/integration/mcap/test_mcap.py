@@ -20,6 +20,7 @@ from fingertip import InputError, JointRecordingWriter, RecordingWriter, read_re
 from mcap.reader import make_reader  # noqa: E402
 from mcap.writer import Writer  # noqa: E402
 from real_time import RealTime, plugged_in  # noqa: E402
+from small_disk import disk_of  # noqa: E402
 
 TWO = ROOT / "tests/fuzz/corpus/recording/two"
 
@@ -174,12 +175,8 @@ class TestMcap(unittest.TestCase):
         self.assertFalse((self.folder / "out.csv").exists())
 
     def test_a_full_disk_is_said_and_leaves_what_was_there(self):
-        def with_little_room():
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (15000, 15000))
-
         full = self.folder / "full.mcap"
-        self.assertIn("nothing was changed", self.refused("convert", self.csv, full, preexec_fn=with_little_room))
+        self.assertIn("nothing was changed", self.refused("convert", self.csv, full, preexec_fn=disk_of(15000)))
         self.assertFalse(full.exists())
         packets = bags.some_packets(3, 4000)
         info = next(packets)

@@ -6,7 +6,6 @@ import math
 import os
 import pathlib
 import re
-import resource
 import signal
 import subprocess
 import sys
@@ -19,6 +18,7 @@ PATIENCE_s = 300
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import files  # noqa: E402
 from real_time import RealTime  # noqa: E402
+from small_disk import disk_of  # noqa: E402
 
 READ_AS_THE_EMULATOR_DOES = """
 import { readScenario } from '%s';
@@ -208,11 +208,7 @@ class Files(TwinTest):
         self.scenario("taps", "--seconds", "5")
         before = [(self.folder / name).read_bytes() for name in ("played.csv", "played.truth.csv")]
 
-        def small_disk():
-            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-            resource.setrlimit(resource.RLIMIT_FSIZE, (100000, 100000))
-
-        err = self.scenario_error("taps", "--seconds", "60", "--overwrite", preexec_fn=small_disk)
+        err = self.scenario_error("taps", "--seconds", "60", "--overwrite", preexec_fn=disk_of(100000))
         self.assertIn("played.csv", err)
         self.assertEqual(before, [(self.folder / name).read_bytes() for name in ("played.csv", "played.truth.csv")])
         self.assertEqual(sorted(os.listdir(self.folder)), ["played.csv", "played.truth.csv"])
