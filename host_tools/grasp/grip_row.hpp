@@ -19,7 +19,6 @@
 #include "grasp/control/grip.hpp"
 #include "libfingertip/line_source.hpp"
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>

@@ -7,7 +7,6 @@
 #include "grasp/gripper/gripper.hpp"
 #include "libfingertip/clock.hpp"
 
-#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <functional>

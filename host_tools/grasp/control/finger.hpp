@@ -5,7 +5,6 @@
 #include "grasp/fingertip_grip.h"
 
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 

@@ -9,7 +9,6 @@
 #include "tool/advice.hpp"
 
 #include <atomic>
-#include <cmath>
 #include <cstdio>
 #include <poll.h>
 #include <sstream>

@@ -67,6 +67,11 @@ class GraspTest(WorldCase):
     def start(self, *arguments, **options):
         return self.world.start([FINGERTIP, *self.ARGUMENTS, f"{self.folder}/gripper", *arguments], env=self.environment, **options)
 
+    def holding(self, *arguments, **options):
+        process = self.start(*arguments, **options)
+        self.until_state(process, "holding")
+        return process
+
     def run_grasp(self, *arguments, status=0, **options):
         return self.run_cli(*self.ARGUMENTS, f"{self.folder}/gripper", *arguments, status=status, **options)
 
@@ -152,8 +157,7 @@ class Usage(GraspTest):
 class Course(GraspTest):
     def test_holds_until_the_end_is_asked_for_and_then_opens_when_told_to(self):
         with self.cell():
-            process = self.start()
-            self.until_state(process, "holding")
+            process = self.holding()
             self.tell("load 2")
             self.world.until(lambda: self.tell()[1] > HOLDS_2_N)
             process.terminate()
@@ -187,8 +191,7 @@ class Course(GraspTest):
 
     def test_ctrl_c_holds_and_the_second_opens_slowly(self):
         with self.cell():
-            process = self.start("-o", self.csv, "--open-width", "45")
-            self.until_state(process, "holding")
+            process = self.holding("-o", self.csv, "--open-width", "45")
             self.world.sleep(0.137)  # anywhere between two of its lines
             asked_s = self.world.now_s
             process.send_signal(signal.SIGINT)
@@ -211,8 +214,7 @@ class Course(GraspTest):
 
     def test_a_kill_keeps_the_gripper_where_it_was(self):
         with self.cell():
-            process = self.start("-o", self.csv)
-            self.until_state(process, "holding")
+            process = self.holding("-o", self.csv)
             process.kill()
             process.wait()
             self.assertGreater(self.steady()[1], 0.5)
@@ -222,8 +224,7 @@ class Course(GraspTest):
 
     def test_another_program_asks(self):
         with self.cell():
-            process = self.start("--quiet", "-o", self.csv, stderr=subprocess.STDOUT)
-            self.until_state(process, "holding")
+            process = self.holding("--quiet", "-o", self.csv, stderr=subprocess.STDOUT)
             self.tell("load 2")
             self.steady()
             client = self.enterContext(socket.socket(socket.AF_UNIX))
@@ -258,8 +259,7 @@ class Trouble(GraspTest):
     """Nothing of this opens the gripper or tightens it."""
 
     def hold(self, *arguments):
-        process = self.start("-o", self.csv, *arguments)
-        self.until_state(process, "holding")
+        process = self.holding("-o", self.csv, *arguments)
         self.tell("load 1")
         self.world.sleep(2)  # down from the start force
         self.assertGreater(self.steady()[1], 0.9)
@@ -367,8 +367,7 @@ class Trouble(GraspTest):
 
     def test_a_full_disk_ends_the_recording_and_not_the_grasp(self):
         with self.cell():
-            process = self.start("-o", self.csv, preexec_fn=disk_of(600000))
-            self.until_state(process, "holding")
+            process = self.holding("-o", self.csv, preexec_fn=disk_of(600000))
             self.told(process, "not recorded any more")
             self.tell("load 2")
             self.world.until(lambda: self.tell()[1] > HOLDS_2_N)
@@ -383,8 +382,7 @@ class Recorded(GraspTest):
 
     def record(self):
         with self.cell():
-            process = self.start("-o", self.csv)
-            self.until_state(process, "holding")
+            process = self.holding("-o", self.csv)
             self.tell("load 2")
             self.assertGreater(self.steady()[1], HOLDS_2_N)
             self.tell("slide 1")

@@ -1,4 +1,5 @@
 #include "grasp/gripper/robotiq_urcap.hpp"
+#include "models.hpp"
 
 #include <arpa/inet.h>
 #include <atomic>
@@ -9,6 +10,7 @@
 #include <thread>
 
 using namespace fingertip;
+using test::code_of;
 
 namespace {
 
@@ -73,15 +75,6 @@ private:
   Descriptor listener_{socket(AF_INET, SOCK_STREAM, 0)};
   std::thread thread_;
 };
-
-ErrorCode code_of(const std::function<void()> &act) {
-  try {
-    act();
-  } catch (const Error &error) {
-    return error.code();
-  }
-  return ErrorCode::other;
-}
 
 } // namespace
 
