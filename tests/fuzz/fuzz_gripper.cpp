@@ -1,28 +1,14 @@
 // The gripper clients, and whatever answers on their line: a Robotiq by Modbus, a Feetech servo.
 #include "fuzz.h"
 #include "grasp/gripper/feetech.hpp"
-#include "grasp/gripper/gripper.hpp"
+#include "grasp/gripper/robotiq.hpp"
 #include "libfingertip/served_port.hpp"
 
 #include <atomic>
 #include <thread>
 
 using namespace fingertip;
-using Bytes = std::vector<std::uint8_t>;
-
-// Modbus over serial line 1.02, 6.2.2.
-static Bytes with_crc(Bytes bytes) {
-  unsigned crc = 0xFFFF;
-  for (const std::uint8_t byte : bytes) {
-    crc ^= byte;
-    for (int bit = 0; bit < 8; bit++) {
-      crc = crc >> 1 ^ (crc & 1 ? 0xA001u : 0);
-    }
-  }
-  bytes.push_back(static_cast<std::uint8_t>(crc & 0xFF));
-  bytes.push_back(static_cast<std::uint8_t>(crc >> 8));
-  return bytes;
-}
+using robotiq::Bytes, robotiq::with_crc;
 
 // A port whose other end answers as the input says, in another thread.
 class Line {

@@ -1,6 +1,6 @@
 #include "support/gripper_lines.hpp"
 
-#include "grasp/gripper/serial_line.hpp"
+#include "grasp/gripper/robotiq.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -94,21 +94,7 @@ std::string Tape::complaint() {
   return complaint_;
 }
 
-std::string with_crc(const std::string &bytes) {
-  /* Modbus over serial line, specification and implementation guide V1.02, appendix B. */
-  unsigned crc = 0xFFFF;
-  Bytes all = bytes_of(bytes);
-  for (std::uint8_t byte : all) {
-    crc ^= byte;
-    for (int bit = 0; bit < 8; bit++) {
-      const unsigned out = crc & 1;
-      crc = (crc >> 1) ^ (out ? 0xA001u : 0u);
-    }
-  }
-  all.push_back(static_cast<std::uint8_t>(crc & 0xFF));
-  all.push_back(static_cast<std::uint8_t>(crc >> 8));
-  return digits(all);
-}
+std::string with_crc(const std::string &bytes) { return digits(robotiq::with_crc(bytes_of(bytes))); }
 
 std::string asked(const std::string &port, const std::string &question, std::size_t answer_length) {
   SerialLine line(port, 115200);
