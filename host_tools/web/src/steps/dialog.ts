@@ -22,8 +22,7 @@ export class Dialog {
       heading,
       this.content,
       this.message,
-      this.problem,
-      this.choices,
+      element('footer', {}, this.problem, this.choices),
     );
     this.element.addEventListener('close', () => {
       this.is_closed = true;
