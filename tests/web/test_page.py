@@ -47,7 +47,6 @@ with open(sys.argv[1], "rb") as file:
 TEN_TIMES = "const now_ms = performance.now.bind(performance); performance.now = () => 10 * now_ms();"
 # The page is as patient as this test: a busy machine makes it slower, never red.
 PATIENT = {"tries": PATIENCE_s} | {f"{name}_ms": 1000 * PATIENCE_s for name in ("version", "frame", "slow_frame", "tared", "back")}
-SILENCE = PATIENT | {"tries": 1}  # where no answer is what is to come
 NO_SAVE_DIALOG = "delete window.showSaveFilePicker; delete window.showOpenFilePicker;"
 
 
@@ -68,9 +67,8 @@ class PageTest(unittest.TestCase):
     def setUp(self):
         self.bench = self.enterContext(Bench(OPTIONS))
 
-    def open(self, before="", patience=PATIENT, **options):
-        """patience: the page's, model/patience.ts."""
-        before = f"globalThis.fingertipPatience = {json.dumps(patience)}; {NO_SAVE_DIALOG}{before}"
+    def open(self, before="", **options):
+        before = f"globalThis.fingertipPatience = {json.dumps(PATIENT)}; {NO_SAVE_DIALOG}{before}"
         page = self.browser.page(self.url, before=before, **options)
         self.addCleanup(page.close)
         self.addCleanup(self.nothing_else_happened, page)
@@ -273,14 +271,6 @@ class Calibrate(PageTest):
 class BadInput(PageTest):
     """Each is a sentence that says what to do."""
 
-    def test_an_older_protocol(self):
-        self.bench.fake(self.browser, SERIALS[0], "version=4")
-        self.assertRegex(self.alert(self.open(patience=SILENCE), "/version 4/"), "install the firmware that belongs to this page")
-
-    def test_something_else_with_our_test_id(self):
-        self.bench.fake(self.browser, SERIALS[0], "mute=1")
-        self.assertRegex(self.alert(self.open(patience=SILENCE | {"version_ms": 100}), "/nothing answers/"), "choose another")
-
     def test_something_else_with_its_own_id_is_left_alone(self):
         self.bench.fake(self.browser, "5", "mute=1", usb_id="10c4:ea60")
         page = self.open()
@@ -450,6 +440,20 @@ class Looks(PageTest):
             flags_px = "document.querySelector('canvas.flags').getBoundingClientRect().width"
             page.until(f"document.querySelector('.traces').clientWidth === {flags_px}")
 
+    def test_a_replay_is_zoomed(self):
+        """By drawing over a part, by the wheel and by keys."""
+        page = self.paused()
+        x, y, width = page.run("(({x, y, width}) => [x, y, width])(document.querySelector('.u-over').getBoundingClientRect())")
+        page.press_at(x + width / 2, y + 9)
+        page.drag_to(x + 0.75 * width, y + 9)
+        page.release()
+        shown = "document.querySelector('.window').selectedOptions[0].textContent + document.querySelector('.moment').textContent"
+        page.until(f"{shown} === '5.0 s−9.0 s'")
+        page.call("Input.dispatchMouseEvent", type="mouseWheel", x=x, y=y, deltaX=0, deltaY=-9)
+        page.until(f"{shown} === '4.0 s−9.0 s'")
+        page.key("-", "Minus")
+        page.until(f"{shown} === '8.0 s−9.0 s'")
+
 
 class Simulations(PageTest):
     """What `fingertip simulate` runs on this computer."""
@@ -488,6 +492,17 @@ class Simulations(PageTest):
         page.release()
         page.until(f"{self.FIRST}.line.truth.force_N === 0 && !({self.FIRST}.contact.flags & 1)")
         page.until("[...document.querySelectorAll('.truth')].every(each => each.textContent === '')")
+
+        # It is calibrated where it lies, beside the dialog.
+        page.click("button", "Calibrate")
+        page.click("button", "Begin")
+        first = page.until(f"{self.FIRST}.found?.wanted")
+        page.click("button", "Press")
+        page.until(f"{self.FIRST}.found.placements.length === 1")
+        self.assertNotEqual(page.run(f"{self.FIRST}.found.wanted"), first)
+        page.click("button", "Cancel")
+        page.until(f"{self.FIRST}.found === null")
+        self.assertEqual(page.run("document.querySelector('.above').ariaPressed"), "true")  # as it was turned
 
         Bench.end(simulation)
         page.until(f"{self.FIRST}.state === 'closed' && /simulation has ended/.test({self.FIRST}.why)")
@@ -610,13 +625,6 @@ class Everyone(PageTest):
             opposite = [place for text, place in said if text == f"−{most_mm}" and abs(place[1 - axis] - ends[0][1 - axis]) < 2]
             self.assertAlmostEqual((ends[0][axis] - opposite[0][axis]) / px_per_mm, 2 * most_mm, delta=0.5, msg=name)
 
-    def test_a_simulated_processor_has_no_load(self):
-        page = self.everything()
-        page.until("fingertip.fingertips[0].health")
-        page.until("[...document.querySelectorAll('.facts dt')].some(each => each.textContent === 'running for')")
-        facts = "[...document.querySelectorAll('.facts dt')].map(each => each.textContent)"
-        self.assertEqual(page.run(f"{facts}.filter(each => /busy|stack/.test(each))"), [])
-
     def test_the_focus_stays_where_something_was_pressed(self):
         """Though its control is hidden, disabled or gone."""
         page = self.open()
@@ -645,6 +653,9 @@ class Everyone(PageTest):
     def test_by_keys_alone(self):
         """Every control is reached, and none holds the focus."""
         page = self.everything()
+        facts = "[...document.querySelectorAll('.facts dt')].map(each => each.textContent)"
+        page.until(f"{facts}.includes('running for')")
+        self.assertFalse(page.run(f"{facts}.some(each => /busy|stack/.test(each))"))  # of a simulated processor
         wanted = {"Connect", "Simulate", "Replay a file", "Tare", "Set", "Calibrate", "Record", "Doctor", "Disconnect"}
         reached = set()
         for _ in range(60):

@@ -67,7 +67,9 @@ EXPORT(answer_bytes) unsigned answer_bytes() { return static_cast<unsigned>(answ
 EXPORT(gains_begin) GainSession *gains_begin() {
   const wire_info info = packet_of(WIRE_INFO).body.info;
   calibrating::check_firmware(info, "this fingertip");
-  return new GainSession(info);
+  auto *session = new GainSession(info);
+  session->judge(false); // where the first is wanted
+  return session;
 }
 EXPORT(gains_free) void gains_free(GainSession *session) { delete session; }
 // 1: a placement was completed, and judged.
@@ -80,20 +82,19 @@ EXPORT(gains_take) int gains_take(GainSession *session) {
 }
 EXPORT(gains_take_back) void gains_take_back(GainSession *session) { session->take_back(); }
 EXPORT(gains_status) void gains_status(const GainSession *session) {
-  using Finder = calibrating::PlacementFinder::State;
   const calibrating::Judgement &judgement = session->judgement();
-  const Finder finder = session->finder().state();
   json placements = json::array();
   for (const calibrating::Fitted &fitted : judgement.solution.placements) {
     placements.push_back({{"x_mm", fitted.x_mm}, {"y_mm", fitted.y_mm}, {"kept", fitted.kept}});
   }
+  const json wanted = session->wanted() ? json{{"x_mm", session->wanted()->x_mm}, {"y_mm", session->wanted()->y_mm}} : json();
   answer_with({{"state", name_of(judgement.state)},
                {"text", session->placements().empty() ? "" : judgement.text},
                {"advice", session->advice()},
                {"progress", session->progress()},
-               {"settling", finder == Finder::settling},
-               {"taken", finder == Finder::taken},
-               {"placements", placements}});
+               {"placements", placements},
+               {"wanted", wanted},
+               {"gain", judgement.solution.gain}});
 }
 // force_N: NaN where it is not known.
 EXPORT(gains_result)

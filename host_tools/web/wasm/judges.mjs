@@ -52,11 +52,11 @@ class Gains extends PressSession {
     this.ask('take_back');
   }
   /**
-   * text: a sentence, why, and what to do; empty before the first placement. advice: what to do now. settling, taken: the present
-   * placement. kept: it fits the others.
+   * text: a sentence, why, and what to do; empty before the first placement. advice: what to do now. kept: it fits
+   * the others. wanted: the best next place. gain: of each sensor, once they can be solved.
    * @returns {{
-   *   state: 'more' | 'good' | 'refused', text: string, advice: string, progress: string, settling: boolean, taken: boolean,
-   *   placements: { x_mm: number, y_mm: number, kept: boolean }[],
+   *   state: 'more' | 'good' | 'refused', text: string, advice: string, progress: string,
+   *   placements: { x_mm: number, y_mm: number, kept: boolean }[], wanted: { x_mm: number, y_mm: number } | null, gain: number[],
    * }}
    */
   status() {

@@ -249,15 +249,10 @@ test('history: a ring with absolute numbers, times that never fall, frames that 
   assert.equal(history.end, 22);
   assert.ok(Math.abs(history.t_s[20 % 8]! - 2.022) < 1e-9);
   assert.ok(Math.abs(history.t_s[21 % 8]! - 2.023) < 1e-9);
-});
-
-test('history: a raw packet without its contact packet has a row of its own', () => {
-  const history = new History(1, 8);
-  history.addRaw(rawOf(5, 100, [3], { flags: Flag.TARED }));
-  history.addContact(contactOf(6, 200));
-  assert.equal(history.end, 2);
-  assert.equal(history.flags[0], Flag.TARED);
-  assert.ok(Number.isNaN(history.columns.force_N[0]));
+  history.addRaw(rawOf(5, 5010, [3, 3], { flags: Flag.TARED })); // without its contact packet: a row of its own
+  assert.equal(history.end, 23);
+  assert.equal(history.flags[22 % 8], Flag.TARED);
+  assert.ok(Number.isNaN(history.columns.force_N[22 % 8]));
 });
 
 test('settings: commands for what differs', () => {

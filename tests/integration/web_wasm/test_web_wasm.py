@@ -150,10 +150,8 @@ class Simulated(WebWasm):
         self.assertLess(abs(felt["force_N"] / truth["force_N"] - 1), 0.05)
         self.assertFalse(self.truth["lift"]["contact"])
 
-    def test_a_sleep_is_skipped(self):
+    def test_a_sleep_is_skipped_and_nothing_comes_while_it_is_closed(self):
         self.assertAlmostEqual(self.seen["after_sleep_s"], 0.2, delta=0.05)
-
-    def test_nothing_comes_while_it_is_closed(self):
         self.assertEqual(self.seen["bytes_closed"], 0)
 
     def test_the_loader_and_the_plug(self):
@@ -191,7 +189,7 @@ class Judges(WebWasm):
         self.assertEqual(location.groups(), tuple(f"{result[key]['location_mm']:.2f}" for key in ("before", "after")))
         self.assertEqual(result["calibration"]["calibration_date_s"], 1700000000)
         self.assertEqual(found["left"], len(found["status"]["placements"]) - 1)
-        self.assertEqual(found["advice"][0], "set the weight down on its round foot")
+        self.assertEqual(found["advice"][0], "set the weight down on its round foot, best near x 0 y 0 mm")
         self.assertIn("taken: lift it", found["advice"])
         # Not the weight that was on it.
         wrong = self.judged("gains", capture, "0.01")

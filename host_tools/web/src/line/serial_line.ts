@@ -114,12 +114,9 @@ export class SerialLine implements Line {
 }
 
 /** Asks for a port; needs a click. null: nothing was chosen. Throws Error, a sentence. */
-export async function requestPort(any = false): Promise<SerialPort | null> {
-  if (!hasWebSerial()) {
-    throw new Error(whyNoWebSerial());
-  }
+export async function requestPort(): Promise<SerialPort | null> {
   try {
-    return await navigator.serial.requestPort(any ? {} : { filters: FINGERTIP_PORTS });
+    return await navigator.serial.requestPort({ filters: FINGERTIP_PORTS });
   } catch (error) {
     if (error instanceof DOMException && error.name === 'NotFoundError') {
       return null;

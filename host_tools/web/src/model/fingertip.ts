@@ -70,6 +70,13 @@ interface Waiting {
 
 let fingertips_made = 0;
 
+/** What a calibration under way has found. wanted: the best next place; gain: [sensor], empty as long as they are unknown. */
+export interface Found {
+  readonly placements: readonly { x_mm: number; y_mm: number; kept: boolean }[];
+  readonly wanted: { x_mm: number; y_mm: number } | null;
+  readonly gain: readonly number[];
+}
+
 export class Fingertip {
   /** Its number on this page, from 1 on. */
   readonly id = ++fingertips_made;
@@ -81,6 +88,8 @@ export class Fingertip {
   /** How its firmware last ended; null until asked for (askCrash). */
   crash: Crash | null = null;
   readonly clock = new core.ClockFit();
+  /** null: none is under way. */
+  found: Found | null = null;
   /** null until its info came. */
   history: History | null = null;
   /** Packets of either kind since it was opened. */
@@ -94,10 +103,10 @@ export class Fingertip {
   private readonly decoder = new core.Decoder();
   private readonly listeners = new Set<() => void>();
   private readonly taps = new Set<PacketTap>();
-  private readonly waiting: Waiting[] = [];
+  private readonly waiting = new Set<Waiting>();
   private sequence = 0;
   private other_serial = '';
-  private timer: ReturnType<typeof setInterval> | null = null;
+  private timer: ReturnType<typeof setInterval> | undefined;
   private clock_asked_ms = 0;
 
   constructor(
@@ -313,22 +322,17 @@ export class Fingertip {
       let timer: ReturnType<typeof setTimeout>;
       const end = (): void => {
         clearTimeout(timer);
-        sent.forEach((each) => this.forget(each));
+        sent.forEach((each) => this.waiting.delete(each));
       };
       const fail = (error: Error): void => {
         end();
         failed(error);
       };
       const send = (): void => {
-        if (sent.length >= tries && refused) {
-          end();
-          done(refused);
-          return;
-        }
         if (sent.length >= tries) {
+          end();
           const name = core.commandName(command.type);
-          fail(new Error(`${name}: the fingertip does not answer; unplug it and plug it in again`));
-          return;
+          return refused ? done(refused) : failed(new Error(`${name}: the fingertip does not answer; unplug it and plug it in again`));
         }
         const sequence = this.sequence++ & 0xffff;
         const sent_us = Math.round(performance.now() * 1000);
@@ -348,7 +352,7 @@ export class Fingertip {
           failed: fail,
         };
         sent.push(waiting);
-        this.waiting.push(waiting);
+        this.waiting.add(waiting);
         timer = setTimeout(send, answer_ms);
         this.line
           .send(core.encode({ ...command, sequence, t_us: sent_us }))
@@ -356,13 +360,6 @@ export class Fingertip {
       };
       send();
     });
-  }
-
-  private forget(waiting: Waiting): void {
-    const at = this.waiting.indexOf(waiting);
-    if (at >= 0) {
-      this.waiting.splice(at, 1);
-    }
   }
 
   private receive(bytes: Uint8Array, at_ms: number): void {
@@ -415,7 +412,7 @@ export class Fingertip {
   };
 
   private acknowledge(ack: Ack): void {
-    const waiting = this.waiting.find((each) => each.command === ack.command && each.sequence === ack.command_sequence);
+    const waiting = [...this.waiting].find((each) => each.command === ack.command && each.sequence === ack.command_sequence);
     if (waiting && waiting.sent_us === ack.host_time_us) {
       this.clock.add(waiting.sent_us, this.heard_ms * 1000, ack.t_us);
       waiting.done(ack);
@@ -435,10 +432,7 @@ export class Fingertip {
   }
 
   private gone(why: string): void {
-    if (this.timer !== null) {
-      clearInterval(this.timer);
-      this.timer = null;
-    }
+    clearInterval(this.timer);
     this.state = 'closed';
     this.why = why;
     for (const waiting of [...this.waiting]) {

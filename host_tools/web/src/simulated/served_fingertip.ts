@@ -38,7 +38,7 @@ export class ServedFingertip implements Line {
 
   private readonly client = Array.from(crypto.getRandomValues(new Uint8Array(8)), (byte) => byte.toString(16).padStart(2, '0')).join('');
   private readonly aborter = new AbortController();
-  private timer: ReturnType<typeof setInterval> | null = null;
+  private timer: ReturnType<typeof setInterval> | undefined;
   private asking = false;
   private command = '';
 
@@ -109,7 +109,7 @@ export class ServedFingertip implements Line {
     this.command = '';
     try {
       const answer = await this.post('simulated/hand', sent);
-      if (answer.ok && this.timer !== null) {
+      if (answer.ok && this.timer !== undefined) {
         const truth = (await answer.json()) as Partial<typeof NO_TRUTH>;
         const { force_N = 0 } = truth;
         this.truth = { ...NO_TRUTH, ...truth, contact: force_N > 0 };
@@ -118,16 +118,14 @@ export class ServedFingertip implements Line {
       // The line reports that the server has ended.
     }
     this.asking = false;
-    if (this.command !== '' && this.timer !== null) {
+    if (this.command !== '' && this.timer !== undefined) {
       void this.ask('');
     }
   }
 
   private end(): void {
-    if (this.timer !== null) {
-      clearInterval(this.timer);
-    }
-    this.timer = null;
+    clearInterval(this.timer);
+    this.timer = undefined;
     this.truth = NO_TRUTH;
   }
 }

@@ -3,11 +3,12 @@
  * gains from placements of one weight, and for the scale of the tangential force from pulls.
  */
 import { frameOf } from '../core';
-import { Capability, PacketType, Stored, type Info } from '../line/line_facts';
+import { Capability, PacketType, Stored } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
 import { PATIENCE, pause } from '../model/patience';
 import { sensorsOf } from '../view/health_facts';
 import { fixed } from '../view/numbers';
+import type { Hand } from '../view/shown';
 import { MAIN, element, paragraph } from '../view/elements';
 import { Dialog, field, form } from './dialog';
 import { loadJudges } from './judges';
@@ -108,6 +109,9 @@ export function calibrate(fingertip: Fingertip): void {
     `Calibrate ${fingertip.name}`,
     'Sensors under cast rubber differ by some 10 %. Set one weight on a round foot (some 300 g on a ball of ' +
       '15 mm) down at about twenty places, and give its weight if forces are to be right too.',
+    ...((fingertip.line as Partial<Hand>).press
+      ? ['Of a simulated one the pointer is the weight: hold it down at the mark on the pad until it is taken. 4 N are 408 g.']
+      : []),
     calibrated
       ? `It is calibrated, of ${new Date(info.calibration_date_s * 1000).toISOString().slice(0, 10)}, ` +
           `from ${info.calibration_placements} placements, force scale ${info.force_scale.toFixed(3)}.`
@@ -148,28 +152,22 @@ async function gains(dialog: Dialog, fingertip: Fingertip, judges: Judges, force
   const session = judges.gains(frameOf(await fingertip.askInfo()));
   const progress = paragraph();
   const text = paragraph();
-  const places = element('ol', { class: 'placements', 'aria-label': 'Placements' });
-  dialog.show(progress, text, places);
+  dialog.show(progress, text);
+  dialog.onClose = () => (fingertip.found = null);
+  dialog.beside();
   const undo = dialog.doing('Take back the last', async () => session.takeBack());
   dialog.choose([undo]);
-  let listed = '';
   await follow(
     dialog,
     fingertip,
     PacketType.RAW,
     session,
     (status) => {
-      dialog.setMessage(`${status.settling ? 'Hold still. ' : status.taken ? 'Taken: lift it off. ' : ''}${status.advice}`);
+      dialog.setMessage(status.advice);
       progress.textContent = status.progress;
       text.textContent = status.text;
       undo.disabled = status.placements.length === 0;
-      const list = JSON.stringify(status.placements);
-      if (list !== listed) {
-        listed = list;
-        const words = ({ x_mm, y_mm, kept }: { x_mm: number; y_mm: number; kept: boolean }) =>
-          `x ${x_mm.toFixed(1)} y ${y_mm.toFixed(1)} mm${kept ? '' : ', left out: it does not fit the others'}`;
-        places.replaceChildren(...status.placements.map((each) => element('li', {}, words(each))));
-      }
+      fingertip.found = status;
     },
     () => confirmGains(dialog, fingertip, session, force_N),
   );
@@ -178,6 +176,7 @@ async function gains(dialog: Dialog, fingertip: Fingertip, judges: Judges, force
 function confirmGains(dialog: Dialog, fingertip: Fingertip, session: GainSession, force_N: number | null): void {
   const date_s = Math.floor(Date.now() / 1000);
   const { calibration, before, after } = session.result(force_N, date_s);
+  fingertip.found = { ...session.status(), wanted: null };
   dialog.show(
     `${session.status().text}, from ${calibration.calibration_placements} placements`,
     table(
@@ -259,31 +258,19 @@ async function pulls(dialog: Dialog, fingertip: Fingertip, judges: Judges, force
     },
     async () => {
       const info = await fingertip.askInfo();
-      confirmPulls(dialog, fingertip, info, session.result(frameOf(info)));
+      const { tangential_scale, tangential_scale_sd } = session.result(frameOf(info));
+      dialog.show(
+        `Tangential scale ${info.pad_tangential_scale.toFixed(3)} before, ${tangential_scale.toFixed(3)} now, ` +
+          `standard deviation ${tangential_scale_sd.toFixed(3)}.`,
+      );
+      const pad_tangential_scale = Math.fround(tangential_scale);
+      dialog.offer(async () => {
+        const profile = { ...info, pad_tangential_scale, pad_tangential_scale_sd: tangential_scale_sd };
+        await fingertip.command({ ...profile, type: PacketType.CMD_PAD });
+        if ((await fingertip.askInfo()).pad_tangential_scale !== pad_tangential_scale) {
+          throw new Error('it did not keep the pad\'s profile; see "Doctor"');
+        }
+      });
     },
   );
-}
-
-function confirmPulls(
-  dialog: Dialog,
-  fingertip: Fingertip,
-  info: Info,
-  found: { tangential_scale: number; tangential_scale_sd: number },
-): void {
-  dialog.show(
-    `Tangential scale ${info.pad_tangential_scale.toFixed(3)} before, ${found.tangential_scale.toFixed(3)} now, ` +
-      `standard deviation ${found.tangential_scale_sd.toFixed(3)}.`,
-  );
-  const pad_tangential_scale = Math.fround(found.tangential_scale);
-  dialog.offer(async () => {
-    await fingertip.command({
-      ...info,
-      type: PacketType.CMD_PAD,
-      pad_tangential_scale,
-      pad_tangential_scale_sd: found.tangential_scale_sd,
-    });
-    if ((await fingertip.askInfo()).pad_tangential_scale !== pad_tangential_scale) {
-      throw new Error('it did not keep the pad\'s profile; see "Doctor"');
-    }
-  });
 }

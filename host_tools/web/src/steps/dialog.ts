@@ -12,6 +12,7 @@ export class Dialog {
   private readonly problem = element('p', { class: 'error', role: 'alert', hidden: true });
   private readonly choices = element('menu', { class: 'choices' });
   is_closed = false;
+  onClose: () => void = () => undefined;
 
   constructor(title: string, ...content: (Node | string)[]) {
     const id = `step-${++dialogs}`;
@@ -25,8 +26,11 @@ export class Dialog {
       element('footer', {}, this.problem, this.choices),
     );
     this.element.addEventListener('close', () => {
-      this.is_closed = true;
-      this.element.remove();
+      if (!this.element.open) {
+        this.is_closed = true;
+        this.element.remove();
+        this.onClose();
+      }
     });
     this.show(...content);
     document.body.append(this.element);
@@ -58,6 +62,13 @@ export class Dialog {
       this.choose([], 'Close');
     };
     this.choose([this.doing('Store', stored, MAIN)]);
+  }
+
+  /** From now on the page can be used meanwhile. */
+  beside(): void {
+    this.element.close();
+    this.element.classList.add('beside');
+    this.element.show();
   }
 
   setMessage(text: string): void {

@@ -113,12 +113,10 @@ export function spansOf(buckets: Buckets, bit: number | 'lost', first: number, l
 
 /** "5.5 s", from a minute on "1:05.5": of a time that is not negative. */
 export function clock(t_s: number): string {
-  const tenths = Math.round(10 * t_s);
-  const minutes = Math.floor(tenths / 600);
-  const rest = tenths % 600;
-  const seconds = String(Math.floor(rest / 10)).padStart(minutes > 0 ? 2 : 1, '0');
-  const text = rest % 10 ? `${seconds}.${rest % 10}` : seconds;
-  return minutes > 0 ? `${minutes}:${text}` : `${text} s`;
+  const t_ms = Math.round(1000 * t_s);
+  const minutes = Math.floor(t_ms / 60_000);
+  const seconds = String((t_ms % 60_000) / 1000);
+  return minutes > 0 ? `${minutes}:${seconds.replace(/^\d(?!\d)/, '0$&')}` : `${seconds} s`;
 }
 
 /** Round values from low to high: of most steps, but three values where the range has zero in its middle or at its end. */

@@ -27,6 +27,10 @@ export class HandPanel implements Touch {
   constructor(private readonly hand: Hand) {
     this.pressButton = button('Press', () => this.toggle('press'), { 'aria-pressed': 'false' });
     this.holdButton = button('Hold in a grip', () => this.toggle('hold'), { 'aria-pressed': 'false' });
+    const drop = button('Drop it', () => {
+      this.end();
+      hand.drop?.(this.x.value, this.y.value);
+    });
     const lift = button('Lift', () => {
       this.end();
       hand.lift();
@@ -38,7 +42,7 @@ export class HandPanel implements Touch {
       element('p', { class: 'hint' }, 'Press on the pad and drag: longer presses harder, the wheel too. All of it is simulated.'),
       ...this.objects(),
       this.force.element,
-      element('div', { class: 'choices' }, this.pressButton, ...this.dropping(), lift),
+      element('div', { class: 'choices' }, this.pressButton, ...(hand.drop ? [drop] : []), lift),
       element(
         'details',
         {},
@@ -113,15 +117,6 @@ export class HandPanel implements Touch {
       hand.choose?.(object.value);
     });
     return [element('div', { class: 'field' }, element('label', { for: 'object' }, 'Object'), object)];
-  }
-
-  private dropping(): HTMLElement[] {
-    const { hand } = this;
-    const drop = () => {
-      this.end();
-      hand.drop?.(this.x.value, this.y.value);
-    };
-    return hand.drop ? [button('Drop it', drop)] : [];
   }
 
   private slipping(): HTMLElement[] {

@@ -38,11 +38,8 @@ export class HealthPanel {
       );
     }
     facts.forEach((fact, i) => {
-      const value = this.values[i];
-      if (value) {
-        write(value, fact.value);
-        value.className = fact.level;
-      }
+      write(this.values[i], fact.value);
+      this.values[i].className = fact.level;
     });
   }
 }

@@ -97,30 +97,19 @@ export function fixed(value: number, digits: number): string {
 
 export class Numbers {
   readonly element: HTMLElement;
-  private readonly rows = new Map<
-    string,
-    { row: HTMLElement; value: HTMLElement; sd: HTMLElement; doubt: HTMLElement; truth: HTMLElement }
-  >();
+  private readonly rows = NUMBERS.map((number) => {
+    const [value, sd, doubt, truth] = ['value', 'sd', 'doubt', 'truth'].map((name) => element('span', { class: name }));
+    const unit = element('span', { class: 'unit' }, number.unit);
+    const row = element('div', { class: `number ${number.name}` }, element('dt', {}, number.title));
+    row.append(element('dd', {}, value, doubt, ' ', unit, ' ', sd, ' ', truth));
+    return { number, row, value, sd, doubt, truth };
+  });
   private readonly lamps: { bit: number; name: string; lamp: HTMLElement }[] = [];
   private readonly warnings = element('ul', { class: 'warnings' });
   private warned = '';
 
   constructor() {
-    const list = element('dl', { class: 'numbers' });
-    for (const number of NUMBERS) {
-      const value = element('span', { class: 'value' });
-      const sd = element('span', { class: 'sd' });
-      const doubt = element('span', { class: 'doubt' });
-      const truth = element('span', { class: 'truth' });
-      const row = element(
-        'div',
-        { class: `number ${number.name}` },
-        element('dt', {}, number.title),
-        element('dd', {}, value, doubt, ' ', element('span', { class: 'unit' }, number.unit), ' ', sd, ' ', truth),
-      );
-      this.rows.set(number.name, { row, value, sd, doubt, truth });
-      list.append(row);
-    }
+    const list = element('dl', { class: 'numbers' }, ...this.rows.map(({ row }) => row));
     const lamps = element('ul', { class: 'lamps', 'aria-label': 'State' });
     for (const [name, bit, level] of [
       ['contact', Flag.CONTACT, 'accent'],
@@ -139,11 +128,7 @@ export class Numbers {
   show(contact: ShownContact | null, tangential: boolean, limit_mm: number, truth: ShownTruth | null): void {
     const flags = contact?.flags ?? 0;
     const doubtful = (flags & WARNING_FLAGS) !== 0;
-    for (const number of NUMBERS) {
-      const row = this.rows.get(number.name);
-      if (!row) {
-        continue;
-      }
+    for (const { number, ...row } of this.rows) {
       const there = contact !== null && (flags & number.valid) !== 0;
       write(row.value, there ? number.value(contact) : '–');
       write(row.sd, there && number.sd ? number.sd(contact) : '');

@@ -15,7 +15,7 @@ export class PadCard {
   hand: HandPanel | null = null;
   contact: ShownContact | null = null;
   private view: PadView | null = null;
-  private layoutSeen: unknown = null;
+  private places = '';
   private seen = '';
   private readonly nameButton: HTMLButtonElement;
   private readonly name = element('span', { class: 'name' });
@@ -76,7 +76,7 @@ export class PadCard {
       }
       const place = live && truth?.contact ? { x_mm: truth.x_mm, y_mm: truth.y_mm } : null;
       const trail = kept && current ? trailAt(history, row) : [];
-      const scene = sceneOf(shown.layout, this.contact, readings, trail, place, current);
+      const scene = sceneOf(shown.layout, this.contact, readings, trail, place, current, shown.fingertip.found);
       this.view.show(scene);
       const alarm = { slips: 'SLIPS', slides: 'SLIDES', moves: 'MOVES', none: '' }[scene.alarm ?? 'none'];
       write(this.alarm, alarm);
@@ -100,10 +100,11 @@ export class PadCard {
 
   private prepare(): void {
     const { layout, hand } = this.shown;
-    if (!layout || layout === this.layoutSeen) {
+    const places = layout ? `${layout.x_mm} ${layout.y_mm}` : '';
+    if (!layout || places === this.places) {
       return;
     }
-    this.layoutSeen = layout;
+    this.places = places;
     this.view?.element.remove();
     const keys = hand
       ? 'Arrow keys turn it, Home shows it from above. Press on it with the pointer.'

@@ -57,6 +57,7 @@ export class PadPicture {
     const alarm = palette.of(scene.alarm === 'moves' ? 'warning' : 'bad');
     this.slab(padSize(scene.layout), scene.alarm ? mix(rubber, alarm, 0.55) : rubber);
     this.sensors(scene);
+    this.found(scene);
     scene.trail.forEach((past, i) => {
       const share = 0.75 * ((i + 1) / scene.trail.length);
       this.shape(circle(past.x_mm, past.y_mm, 0, 0.4, 12), palette.of('accent'), share);
@@ -165,6 +166,19 @@ export class PadPicture {
       if (scene.broken[k]) {
         this.cross(x_mm, y_mm, 0.7 * SENSOR_mm, 0.5, colour, true);
       }
+    }
+  }
+
+  /** Placements of a calibration, one that fits no other dashed, and where the next is wanted. */
+  private found({ found }: Scene): void {
+    const { palette } = this;
+    for (const { x_mm, y_mm, kept } of found?.placements ?? []) {
+      this.outline(circle(x_mm, y_mm, 0, 1), palette.of(kept ? 'accent' : 'warning'), 0.4, 1, !kept);
+    }
+    if (found?.wanted) {
+      const { x_mm, y_mm } = found.wanted;
+      this.outline(circle(x_mm, y_mm, 0, 3.4), palette.of('accent'), 0.5, 1, true);
+      this.cross(x_mm, y_mm, 1.6, 0.5, palette.of('accent'));
     }
   }
 

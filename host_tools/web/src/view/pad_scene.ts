@@ -1,6 +1,7 @@
 /** What of a fingertip the pictures of its pad show, in mm and N, apart from how they draw it. */
 import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
+import type { Found } from '../model/fingertip';
 import type { Readings } from '../model/history';
 import type { ShownContact, ShownLayout } from './shown';
 
@@ -65,6 +66,8 @@ export interface Scene {
   /** What really is, of a simulated fingertip. */
   truth: Place | null;
   alarm: 'slips' | 'slides' | 'moves' | null;
+  /** By a calibration under way. */
+  found: Found | null;
 }
 
 /** current: false where the newest is too old to be shown as present. */
@@ -75,6 +78,7 @@ export function sceneOf(
   trail: readonly Place[],
   truth: Place | null,
   current: boolean,
+  found: Found | null = null,
 ): Scene {
   const count = layout.x_mm.length;
   const has = (bits: number | undefined, k: number) => ((bits ?? 0) >>> k) % 2 === 1;
@@ -93,6 +97,7 @@ export function sceneOf(
     trail,
     truth,
     alarm: flags & Flag.SLIDING ? 'slides' : flags & Flag.SLIP ? 'slips' : flags & Flag.MOVING ? 'moves' : null,
+    found,
   };
 }
 

@@ -156,6 +156,10 @@ export class PadView {
     this.onLook?.();
   }
 
+  private turnedBy(turn_deg: number, tilt_deg: number): Look {
+    return { turn_deg: this.look.turn_deg + turn_deg, tilt_deg: this.look.tilt_deg + tilt_deg };
+  }
+
   private listen(): void {
     const element = this.element;
     const place = (event: PointerEvent) => {
@@ -191,10 +195,7 @@ export class PadView {
       } else if (this.turning?.id === event.pointerId) {
         const { x, y } = this.turning;
         this.turning = { id: event.pointerId, x: event.clientX, y: event.clientY };
-        this.turnTo({
-          turn_deg: this.look.turn_deg - 0.4 * (event.clientX - x),
-          tilt_deg: this.look.tilt_deg + 0.4 * (event.clientY - y),
-        });
+        this.turnTo(this.turnedBy(-0.4 * (event.clientX - x), 0.4 * (event.clientY - y)));
       }
     });
     const released = (event: PointerEvent) => {
@@ -219,20 +220,12 @@ export class PadView {
       { passive: false },
     );
     element.addEventListener('keydown', (event) => {
-      const step = TURN_STEP_deg;
-      const { turn_deg, tilt_deg } = this.look;
-      const turns: Record<string, Look> = {
-        ArrowLeft: { turn_deg: turn_deg - step, tilt_deg },
-        ArrowRight: { turn_deg: turn_deg + step, tilt_deg },
-        ArrowUp: { turn_deg, tilt_deg: tilt_deg + step },
-        ArrowDown: { turn_deg, tilt_deg: tilt_deg - step },
-        Home: this.lookOf(!this.fromAbove),
-      };
-      const look = turns[event.key];
-      if (look && !event.ctrlKey && !event.metaKey && !event.altKey) {
+      const steps: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+      const step = steps[event.key];
+      if ((step || event.key === 'Home') && !event.ctrlKey && !event.metaKey && !event.altKey) {
         event.preventDefault();
         event.stopPropagation();
-        this.turnTo(look);
+        this.turnTo(step ? this.turnedBy(TURN_STEP_deg * step[0], TURN_STEP_deg * step[1]) : this.lookOf(!this.fromAbove));
       }
     });
   }
@@ -271,12 +264,16 @@ export class PadView {
     pen.font = `600 ${px}px system-ui, sans-serif`;
     for (const { k, x_mm, y_mm } of sensors) {
       const pressure_Pa = scene.saturated[k] ? Infinity : (scene.pressure_Pa[k] ?? 0);
+      const gain = scene.found?.gain[k];
       if (pressure_Pa > NOTED_Pa) {
         const [x, y] = at(x_mm, y_mm, heatPart(pressure_Pa) * HEIGHT_mm);
         values.push([x, flat ? y : y - px * 0.8]);
         const behind = scene.fit && flat ? mix(halo, palette.of('surface'), 0.2) : halo;
         const text = scene.saturated[k] ? 'max' : (pressure_Pa / 1000).toFixed(pressure_Pa < 9950 ? 1 : 0);
         write(text, ...values[values.length - 1], palette.css('text'), cssOf(behind));
+      } else if (gain !== undefined) {
+        const percent = Math.round(100 * (gain - 1));
+        write(`${percent < 0 ? '−' : '+'}${Math.abs(percent)} %`, ...at(x_mm, y_mm, 0), palette.css('accent'), cssOf(halo));
       }
     }
     pen.font = `${px * 0.85}px system-ui, sans-serif`;

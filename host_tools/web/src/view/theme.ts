@@ -3,13 +3,12 @@ import { paletteOf, type Palette } from './palette';
 
 const KEY = 'fingertip.theme';
 const system = matchMedia('(prefers-color-scheme: dark)');
-const listeners = new Set<(palette: Palette) => void>();
+let listener: (palette: Palette) => void = () => undefined;
 
 export type Theme = 'system' | 'light' | 'dark';
 
 function read(): Palette {
-  const chosen = document.documentElement.dataset['theme'];
-  const dark = chosen ? chosen === 'dark' : system.matches;
+  const dark = theme() === 'system' ? system.matches : theme() === 'dark';
   const style = getComputedStyle(document.documentElement);
   return paletteOf((name) => style.getPropertyValue(`--${name}`), dark);
 }
@@ -21,9 +20,8 @@ export function palette(): Palette {
   return current;
 }
 
-export function onPalette(listener: (palette: Palette) => void): () => void {
-  listeners.add(listener);
-  return () => listeners.delete(listener);
+export function onPalette(listens: (palette: Palette) => void): void {
+  listener = listens;
 }
 
 export function theme(): Theme {
@@ -47,22 +45,19 @@ export function setTheme(theme: Theme): void {
 
 /** What was chosen before. */
 export function restoreTheme(): void {
-  let kept: string | null = null;
   try {
-    kept = localStorage.getItem(KEY);
+    const kept = localStorage.getItem(KEY);
+    if (kept === 'light' || kept === 'dark') {
+      setTheme(kept);
+    }
   } catch {
-    kept = null;
-  }
-  if (kept === 'light' || kept === 'dark') {
-    setTheme(kept);
+    // A browser that keeps nothing.
   }
 }
 
 function changed(): void {
   current = read();
-  for (const listener of listeners) {
-    listener(current);
-  }
+  listener(current);
 }
 
 system.addEventListener('change', changed);

@@ -1,9 +1,10 @@
 /** Pause, and a walk through the last minutes. */
 import { button, element, write } from './elements';
 
-const WINDOWS_s = [5, 20, 60, 180];
+const WINDOWS_s = [1, 5, 20, 60, 180];
+const LEAST_s = 0.1;
+const MOST_s = 180;
 const STEP_s = 0.1;
-const FAR_s = 5;
 
 export class Timeline {
   readonly element: HTMLElement;
@@ -17,6 +18,7 @@ export class Timeline {
   private readonly pauseButton: HTMLButtonElement;
   private readonly slider: HTMLInputElement;
   private readonly output: HTMLOutputElement;
+  private readonly zoomed = element('option', { hidden: true });
 
   constructor() {
     this.pauseButton = button('Pause', () => this.toggle(), {
@@ -27,33 +29,19 @@ export class Timeline {
       type: 'range',
       min: -60,
       max: 0,
-      step: 'any',
+      step: STEP_s,
       value: 0,
       'aria-label': 'Moment shown, seconds before now',
     });
     this.output = element('output', { class: 'moment' });
     this.slider.addEventListener('input', () => this.seek(-Number(this.slider.value)));
-    this.slider.addEventListener('keydown', (event) => {
-      const steps: Record<string, number> = {
-        ArrowLeft: STEP_s,
-        ArrowDown: STEP_s,
-        ArrowRight: -STEP_s,
-        ArrowUp: -STEP_s,
-        PageDown: FAR_s,
-        PageUp: -FAR_s,
-      };
-      const step = steps[event.key];
-      if (step !== undefined) {
-        event.preventDefault();
-        this.seek((this.behind_s ?? 0) + (event.shiftKey ? 10 : 1) * step);
-      }
-    });
     const choice = element(
       'select',
       { 'aria-label': 'Time shown', class: 'window' },
       ...WINDOWS_s.map((seconds) =>
         element('option', { value: seconds, selected: seconds === this.window_s }, seconds < 60 ? `${seconds} s` : `${seconds / 60} min`),
       ),
+      this.zoomed,
     );
     choice.addEventListener('change', () => {
       this.window_s = Number(choice.value);
@@ -72,8 +60,8 @@ export class Timeline {
 
   /** How much is kept, so how far back one can go. */
   set length_s(length_s: number) {
-    const kept_s = Math.max(1, length_s);
-    if (Math.abs(kept_s - this.kept_s) > 0.5) {
+    const kept_s = Math.max(1, Math.ceil(length_s)); // whole steps
+    if (kept_s !== this.kept_s) {
       this.kept_s = kept_s;
       this.slider.min = String(-kept_s);
     }
@@ -88,19 +76,27 @@ export class Timeline {
   }
 
   toggle(): void {
-    this.behind_s = this.behind_s === null ? 0 : null;
-    this.show();
-    this.onChange?.();
+    this.seek(this.behind_s === null ? 0 : null);
   }
 
-  seek(behind_s: number): void {
-    this.behind_s = Math.min(Math.max(behind_s, 0), this.kept_s);
+  seek(behind_s: number | null): void {
+    this.behind_s = behind_s === null ? null : Math.min(Math.max(behind_s, 0), this.kept_s);
     this.show();
     this.onChange?.();
   }
 
   step(by_s: number): void {
     this.seek((this.behind_s ?? 0) + by_s);
+  }
+
+  /** Spans that much, up to behind_s. */
+  zoom(window_s: number, behind_s = this.behind_s): void {
+    this.window_s = Math.min(Math.max(window_s, LEAST_s), MOST_s);
+    write(this.zoomed, `${this.window_s.toFixed(this.window_s < 10 ? 1 : 0)} s`);
+    this.zoomed.value = String(this.window_s);
+    this.zoomed.hidden = false;
+    this.zoomed.selected = true;
+    this.seek(behind_s);
   }
 
   private show(): void {

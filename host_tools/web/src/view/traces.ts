@@ -5,13 +5,14 @@ import uPlot from 'uplot';
 import { Buckets, intervalOf, roundAbove, type ColumnName } from './buckets';
 import { chartOf, clock, spansOf, ticksOf, type Chart, type Span } from './curves';
 import { element } from './elements';
+import { padSize } from './pad_scene';
 import { FINGERS, type Palette } from './palette';
 import type { History } from '../model/history';
 import type { Shown } from './shown';
 
 /** Room for the names of values; the flags keep it too, so that times are below one another. */
 const AXIS_px = 52;
-const RIGHT_px = 12;
+const RIGHT_px = 20;
 const MOST_INTERVALS = 1400;
 /** A doubtful force above this is none: the pads are made for less. */
 const MOST_N = 50;
@@ -24,6 +25,8 @@ const TITLE_px = 20;
 const TIMES_px = 22;
 /** The least height at which a plot can be read. */
 const LEAST_PLOT_px = 44;
+/** Of a step of the wheel. */
+const ZOOM = 1.25;
 /** From one tick to the next. */
 const TICK_px = 24;
 const MOST_PLOT_px = 240;
@@ -68,6 +71,10 @@ export class Traces {
   private rows = 2;
   /** Its size is another: draw it again, in a pause too. */
   onResize: (() => void) | null = null;
+  /** A part of it was drawn over. */
+  onSelect: ((span: Span) => void) | null = null;
+  /** Wheel: show so many times the time. */
+  onZoom: ((times: number) => void) | null = null;
 
   constructor() {
     new ResizeObserver(() => {
@@ -79,6 +86,11 @@ export class Traces {
         this.onResize?.();
       }
     }).observe(this.element);
+    const wheel = (event: WheelEvent) => {
+      event.preventDefault();
+      this.onZoom?.(ZOOM ** Math.sign(event.deltaY));
+    };
+    this.element.addEventListener('wheel', wheel, { passive: false });
   }
 
   setPalette(palette: Palette): void {
@@ -124,24 +136,17 @@ export class Traces {
     const most = Math.max(0, ...plot.columns.map((name) => chart.most.get(name)!));
     drawn.threshold = null;
     if (plot.columns[0] === 'x_mm') {
-      const layout = fingertip.layout;
-      const reach = 6 + Math.max(0, ...Array.from(layout?.x_mm ?? [], Math.abs), ...Array.from(layout?.y_mm ?? [], Math.abs));
-      drawn.low = -reach;
-      drawn.high = reach;
-      return;
-    }
-    if (plot.tangential) {
+      const { x_mm, y_mm } = fingertip.layout ? padSize(fingertip.layout) : { x_mm: 1, y_mm: 1 };
+      drawn.high = Math.max(x_mm, y_mm);
+    } else if (plot.tangential) {
       drawn.high = steady(drawn.high, Math.max(most, LEAST_PULL_N));
-      drawn.low = -drawn.high;
-      return;
-    }
-    if (plot.columns[0] === 'slip_mm') {
+    } else if (plot.columns[0] === 'slip_mm') {
       drawn.threshold = fingertip.slip_threshold_mm || null;
       drawn.high = steady(drawn.high, Math.max(most, 0.1, 1.2 * fingertip.slip_threshold_mm));
     } else {
       drawn.high = steady(drawn.high, Math.min(Math.max(most * 1.05, 1), MOST_N));
     }
-    drawn.low = 0;
+    drawn.low = plot.columns.length > 1 ? -drawn.high : 0;
   }
 
   private build(): void {
@@ -201,7 +206,8 @@ export class Traces {
       padding: [6, RIGHT_px, last ? 0 : 4, 0],
       cursor: {
         sync: { key: 'fingertip' },
-        drag: { x: false, y: false },
+        drag: { x: true, y: false, setScale: false },
+        bind: { dblclick: () => null },
         points: { show: false },
         y: false,
       },
@@ -237,6 +243,15 @@ export class Traces {
         fill: `${colour}38`,
       })),
       hooks: {
+        setSelect: [
+          (chart) => {
+            const { left, width } = chart.select;
+            if (width > 0) {
+              chart.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+              this.onSelect?.({ from_s: chart.posToVal(left, 'x'), to_s: chart.posToVal(left + width, 'x') });
+            }
+          },
+        ],
         drawAxes: [
           (chart) => {
             const threshold = drawn()?.threshold;

@@ -106,6 +106,12 @@ export class View {
     });
     this.timeline.onChange = () => this.timeChanged();
     this.traces.onResize = () => (this.tracesDue = true);
+    this.traces.onZoom = (times) => this.timeline.zoom(times * this.timeline.window_s);
+    this.traces.onSelect = ({ from_s, to_s }) => {
+      const chosen = this.selected;
+      const end_s = (chosen && (this.ends.get(chosen) ?? newest_s(chosen.history))) ?? to_s;
+      this.timeline.zoom(to_s - from_s, end_s - to_s);
+    };
     this.root.addEventListener('keydown', (event) => this.key(event));
     bench.listen(() => this.gather());
     this.gather();
@@ -228,6 +234,8 @@ export class View {
       this.timeline.step(event.shiftKey ? 5 : 0.5);
     } else if (event.key === 'ArrowRight') {
       this.timeline.step(event.shiftKey ? -5 : -0.5);
+    } else if (event.key === '+' || event.key === '-') {
+      this.timeline.zoom(this.timeline.window_s * (event.key === '+' ? 0.5 : 2));
     } else {
       return;
     }
