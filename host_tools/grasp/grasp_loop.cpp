@@ -65,16 +65,6 @@ void GraspLoop::begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen, cons
   thread_ = Thread([this] { run(); });
 }
 
-bool GraspLoop::request(GripRequest wanted) {
-  std::lock_guard lock(core_mutex_);
-  return core_->request(wanted);
-}
-
-bool GraspLoop::change(const GripSettings &settings) {
-  std::lock_guard lock(core_mutex_);
-  return core_->change(settings);
-}
-
 std::vector<GraspNews> GraspLoop::take(milliseconds timeout) {
   std::unique_lock lock(news_mutex_);
   for (const HostTime limit = host_now() + timeout; news_.empty() && host_now() < limit;) {

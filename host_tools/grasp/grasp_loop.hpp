@@ -73,9 +73,15 @@ public:
   // Fingertips stream, the core steps; nothing moves before it is requested. Throws Error where the gripper does not answer.
   void begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen, const GripSettings &settings);
   // False: not from this state.
-  bool request(GripRequest wanted);
+  bool request(GripRequest wanted) {
+    std::lock_guard lock(core_mutex_);
+    return core_->request(wanted);
+  }
   // Grip::change.
-  bool change(const GripSettings &settings);
+  bool change(const GripSettings &settings) {
+    std::lock_guard lock(core_mutex_);
+    return core_->change(settings);
+  }
   // All there is, waiting at most this long for the first.
   std::vector<GraspNews> take(std::chrono::milliseconds timeout);
   // The width stays, streams end; news come until the one of kind ended.

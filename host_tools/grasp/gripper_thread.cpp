@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <utility>
 
 namespace fingertip {
 
@@ -46,16 +45,6 @@ void GripperThread::command(const GripCommand &command) {
     command_ = command;
     number_++;
   }
-}
-
-std::deque<GripperThread::News> GripperThread::take() {
-  std::lock_guard lock(mutex_);
-  return std::exchange(news_, {});
-}
-
-bool GripperThread::is_done() const {
-  std::lock_guard lock(mutex_);
-  return sent_ == number_;
 }
 
 void GripperThread::put(News news) {

@@ -14,6 +14,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace fingertip {
 
@@ -35,9 +36,15 @@ public:
   GripperThread &operator=(const GripperThread &) = delete;
 
   void command(const GripCommand &command);
-  std::deque<News> take();
+  std::deque<News> take() {
+    std::lock_guard lock(mutex_);
+    return std::exchange(news_, {});
+  }
   // The newest command has been sent and answered.
-  bool is_done() const;
+  bool is_done() const {
+    std::lock_guard lock(mutex_);
+    return sent_ == number_;
+  }
 
 private:
   void run();

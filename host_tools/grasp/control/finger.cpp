@@ -91,18 +91,6 @@ void GripFinger::take(const GripTouch &touch) {
 
 bool GripFinger::has_load() const { return (touch_.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 && (touch_.flags & FORCE_ONLY) == 0; }
 
-void GripFinger::begin_zero() {
-  of_both_ = 1.0; // another object
-  load_zero_ = place_zero_ = {};
-  is_zeroed_ = false;
-}
-
-void GripFinger::end_zero() {
-  load_zero_.end();
-  place_zero_.end();
-  is_zeroed_ = true;
-}
-
 bool GripFinger::has_zero() const { return !has_load() || load_zero_.frames >= ZERO_FRAMES; }
 
 GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
@@ -151,31 +139,6 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
   const bool is_held = reading.has_load ? recoils : reading.has_place && pulled_ <= settings.friction;
   reading.slides = reading.contact && (touch_.flags & slide) != 0 && !is_held;
   return reading;
-}
-
-void GripFinger::believe(const GripReading &reading) {
-  believed_ = reading;
-  is_doubted_ = false;
-}
-
-bool GripFinger::mark(double least_N) {
-  mark_x_N_ = believed_.load_x_N, mark_y_N_ = believed_.load_y_N;
-  return is_marked_ = believed_.has_load && believed_.load_N >= least_N;
-}
-
-double GripFinger::keeps(const GripReading &reading) const {
-  const double square = mark_x_N_ * mark_x_N_ + mark_y_N_ * mark_y_N_;
-  const double along = mark_x_N_ * reading.load_x_N + mark_y_N_ * reading.load_y_N;
-  return reading.has_load && square > 0.0 ? along / square : 1.0;
-}
-
-double GripFinger::pull_N(const GripReading &reading) const {
-  return reading.has_load ? std::hypot(reading.load_x_N - mark_x_N_, reading.load_y_N - mark_y_N_) : 0.0;
-}
-
-void GripFinger::doubt(const GripReading &reading) {
-  doubted_s_ = is_doubted_ ? doubted_s_ : reading.t_s;
-  is_doubted_ = true;
 }
 
 using Readings = std::array<GripReading, GRIP_FINGERS>;

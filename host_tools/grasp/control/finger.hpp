@@ -5,6 +5,7 @@
 #include "grasp/fingertip_grip.h"
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -53,21 +54,44 @@ public:
   void shares(double load_N, double of_both_N) { of_both_ = of_both_N / load_N; }
   double delay_s() const { return delay_s_; } // moving average of the delay of its frames
   const GripReading &believed() const { return believed_; }
-  void believe(const GripReading &reading);
-  void doubt(const GripReading &reading);
+  void believe(const GripReading &reading) {
+    believed_ = reading;
+    is_doubted_ = false;
+  }
+  void doubt(const GripReading &reading) {
+    doubted_s_ = is_doubted_ ? doubted_s_ : reading.t_s;
+    is_doubted_ = true;
+  }
   // Since the first frame that was doubted.
   double doubted_for_s(const GripReading &reading) const { return is_doubted_ ? reading.t_s - doubted_s_ : 0.0; }
 
   // keeps and pull_N are of the present load from now on. False: it is smaller than this. is_marked: it was not, and frames come.
-  bool mark(double least_N);
+  bool mark(double least_N) {
+    mark_x_N_ = believed_.load_x_N, mark_y_N_ = believed_.load_y_N;
+    return is_marked_ = believed_.has_load && believed_.load_N >= least_N;
+  }
   bool is_marked(const GripReading &reading) const { return is_marked_ && reading.counts; }
   // Share of the marked load that this one has, along it, and how far it is from it. Without a load now: all, and 0.
-  double keeps(const GripReading &reading) const;
-  double pull_N(const GripReading &reading) const;
+  double keeps(const GripReading &reading) const {
+    const double square = mark_x_N_ * mark_x_N_ + mark_y_N_ * mark_y_N_;
+    const double along = mark_x_N_ * reading.load_x_N + mark_y_N_ * reading.load_y_N;
+    return reading.has_load && square > 0.0 ? along / square : 1.0;
+  }
+  double pull_N(const GripReading &reading) const {
+    return reading.has_load ? std::hypot(reading.load_x_N - mark_x_N_, reading.load_y_N - mark_y_N_) : 0.0;
+  }
 
   // Sets the zeros of tangential force and place to their means between begin and end.
-  void begin_zero();
-  void end_zero();
+  void begin_zero() {
+    of_both_ = 1.0; // another object
+    load_zero_ = place_zero_ = {};
+    is_zeroed_ = false;
+  }
+  void end_zero() {
+    load_zero_.end();
+    place_zero_.end();
+    is_zeroed_ = true;
+  }
   bool has_zero() const; // enough frames for end_zero, or no tangential force at all
 
 private:

@@ -51,17 +51,6 @@ void Grip::take(const GripperStatus &status) {
   reach_.take(status, settings_.silent_s);
 }
 
-void Grip::enter(GripState state) {
-  state_ = state;
-  since_s_ = now_s_;
-  is_entered_ = true;
-}
-
-bool Grip::mark(double least_N) {
-  const bool left = fingers_[0].mark(least_N), right = fingers_[1].mark(least_N);
-  return left || right;
-}
-
 bool Grip::request(GripRequest request) {
   switch (request) {
   case GRIP_REQUEST_GRASP:
@@ -125,10 +114,6 @@ std::uint32_t Grip::gripper_trouble() {
   }
   const bool was_active = state_ > GRIP_ACTIVATING;
   return (status_.fault != 0 ? GRIP_GRIPPER_FAULT : 0u) | (was_active && !status_.active ? GRIP_GRIPPER_INACTIVE : 0u);
-}
-
-double Grip::start_force() const {
-  return settings_.mode == GRIP_MODE_FIXED ? settings_.set_N : is_blind_ ? settings_.unseen_N() : settings_.first_N();
 }
 
 // Moves the width towards to_mm, as far as this speed allows since the last step.

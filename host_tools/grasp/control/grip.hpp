@@ -48,7 +48,11 @@ public:
   GripReport step(double now_s, GripCommand &command);
 
 private:
-  void enter(GripState state);
+  void enter(GripState state) {
+    state_ = state;
+    since_s_ = now_s_;
+    is_entered_ = true;
+  }
   bool is_grasping() const { return (state_ >= GRIP_SQUEEZE && state_ <= GRIP_HANDING) || (state_ == GRIP_STILL && still_grasps_); }
   void sample();
   bool is_gone();
@@ -58,12 +62,17 @@ private:
   std::uint32_t squeeze();
   std::uint32_t make_ready();
   std::uint32_t hold();
-  bool mark(double least_N);
+  bool mark(double least_N) {
+    const bool left = fingers_[0].mark(least_N), right = fingers_[1].mark(least_N);
+    return left || right;
+  }
   bool is_taken();
   std::uint32_t aim(const GripAim &aim);
   void ramp(double to_mm, double speed_mm_s);
   double dead_s() const { return readings_.delay_s + traits_.latency_s + reach_.poll_s(); }
-  double start_force() const;
+  double start_force() const {
+    return settings_.mode == GRIP_MODE_FIXED ? settings_.set_N : is_blind_ ? settings_.unseen_N() : settings_.first_N();
+  }
   void fill(GripCommand &command) const;
   GripReport report() const;
 

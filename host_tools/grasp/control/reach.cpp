@@ -52,11 +52,6 @@ static double shown_at_1_mm_N(double from_N, double to_N, double way_mm, double 
   return std::pow(unit_mm / way_mm, exponent);
 }
 
-void GripRubber::begin(double width_mm) {
-  *this = GripRubber();
-  both_mm_ = width_mm;
-}
-
 double GripRubber::force_at(double to_mm, double force_N, double from_mm) const {
   const double grown = indentation_mm(to_mm, both_mm_) / indentation_mm(from_mm, both_mm_);
   return std::max(0.0, force_N + std::max(force_N, LEAST_N) * (std::pow(grown, EXPONENT) - 1.0) * (to_mm < from_mm ? closing_ : opening_));
@@ -132,11 +127,6 @@ void GripReach::take(const GripperStatus &status, double silent_s) {
   widths_[newest_] = {t_s, status.width_mm};
 }
 
-bool GripReach::knows(double t_s) const {
-  const std::size_t oldest = (newest_ + widths_.size() + 1 - count_) % widths_.size();
-  return count_ > 0 && widths_[oldest].t_s <= t_s;
-}
-
 double GripReach::width_at(double t_s) const {
   Width after = widths_[newest_];
   for (std::size_t back = 1; back < count_ && after.t_s > t_s; back++) {
@@ -150,33 +140,12 @@ double GripReach::width_at(double t_s) const {
   return after.width_mm;
 }
 
-bool GripReach::has_stopped(double now_s) const {
-  const double late_s = std::max(now_s - status_.t_s(), 0.0);
-  return !status_.moving && status_.t_s() > aimed_s_ + traits_.latency_s + late_s + poll_s_;
-}
-
 bool GripReach::has_come(double now_s, double frame_s) const {
   return has_stopped(now_s) && frame_s > aimed_s_ + traits_.latency_s + poll_s_ + SHOWS_s;
 }
 
-void GripReach::first_touch(double t_s) {
-  rubber_.begin(width_at(t_s));
-  bound_ = GripBound();
-  detours_ = 0;
-}
-
-// The width at which the gripper will stop. At rest it makes no move shorter than its deadband.
-double GripReach::coming_mm(double now_s) const {
-  const bool stays = has_stopped(now_s) && std::abs(status_.width_mm - target_mm_) <= traits_.deadband_mm + 1e-9;
-  return stays ? status_.width_mm : target_mm_;
-}
-
 bool GripReach::limits_itself(const GripSettings &settings) const {
   return traits_.force_max_N > 0.0 && traits_.force_min_N <= LIMIT * settings.cap_N;
-}
-
-double GripReach::coming_N(const GripReadings &readings, double now_s) const {
-  return rubber_.force_at(coming_mm(now_s), readings.grip_N, width_at(readings.t_s));
 }
 
 double GripReach::last_below_cap_mm(const GripReadings &readings, const GripSettings &settings) const {
@@ -202,14 +171,6 @@ bool GripReach::explains(double from_N, double from_s, double to_N, double to_s,
   const auto [narrow_mm, wide_mm] = std::minmax({from_mm, width_at(to_s), status_.width_mm, target_mm_});
   const double least_N = rubber_.force_at(wide_mm, from_N, from_mm), most_N = rubber_.force_at(narrow_mm, from_N, from_mm);
   return knows(from_s) && to_N >= least_N - settings.alike_N(least_N) && to_N <= most_N + settings.alike_N(most_N);
-}
-
-double GripReach::steps_off(double wanted_N, double force_N, double from_mm, double coming_mm) const {
-  return (coming_mm - rubber_.width_for(wanted_N, force_N, from_mm)) / traits_.step_mm;
-}
-
-bool GripReach::can_detour(const GripReadings &readings) const {
-  return least_mm() > traits_.step_mm && !readings.is_alone() && !readings.over;
 }
 
 double GripReach::travel_below_cap_mm(const GripReadings &readings, const GripSettings &settings, double coming_mm) const {
@@ -311,14 +272,6 @@ GripReach::Outlook GripReach::predict(const GripAim &aim, const GripReadings &re
     outlook.nearest_steps = nearest_steps(steps_to(outlook, aim.wanted_N), outlook.least_mm, may_detour);
   }
   return outlook;
-}
-
-double GripReach::force_at(const Outlook &outlook, double width_mm) const {
-  return rubber_.force_at(width_mm, outlook.force_N, outlook.width_mm);
-}
-
-double GripReach::steps_to(const Outlook &outlook, double wanted_N) const {
-  return steps_off(wanted_N, outlook.force_N, outlook.width_mm, outlook.coming_mm);
 }
 
 double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings, const GripSettings &settings,

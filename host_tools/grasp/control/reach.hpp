@@ -16,7 +16,10 @@ namespace fingertip {
 class GripRubber {
 public:
   // One fingertip touches at this width; both do.
-  void begin(double width_mm);
+  void begin(double width_mm) {
+    *this = GripRubber();
+    both_mm_ = width_mm;
+  }
   void both_touch(double width_mm) { both_mm_ = width_mm; }
   double both_mm() const { return both_mm_; }
   // The force at another width, from the force at this one.
@@ -83,7 +86,10 @@ public:
 
   void take(const GripperStatus &status, double silent_s);
   // Whether the width at this time is known.
-  bool knows(double t_s) const;
+  bool knows(double t_s) const {
+    const std::size_t oldest = (newest_ + widths_.size() + 1 - count_) % widths_.size();
+    return count_ > 0 && widths_[oldest].t_s <= t_s;
+  }
   double width_at(double t_s) const;
   double poll_s() const { return poll_s_; } // moving average of the time between two answers
   // The width that was last sent.
@@ -97,10 +103,18 @@ public:
   bool has_come(double now_s, double frame_s) const;
   // In addition, the gripper's own answers state that it was not moving when the frame was measured.
   bool rests(double now_s, double frame_s) const { return has_come(now_s, frame_s) && frame_s > stopped_s_; }
-  bool has_stopped(double now_s) const; // the last move is complete
+  // The last move is complete.
+  bool has_stopped(double now_s) const {
+    const double late_s = std::max(now_s - status_.t_s(), 0.0);
+    return !status_.moving && status_.t_s() > aimed_s_ + traits_.latency_s + late_s + poll_s_;
+  }
 
   // One fingertip touches at this width; both do. t_s: time of the frames that report it.
-  void first_touch(double t_s);
+  void first_touch(double t_s) {
+    rubber_.begin(width_at(t_s));
+    bound_ = GripBound();
+    detours_ = 0;
+  }
   void both_touch(double t_s) { rubber_.both_touch(width_at(t_s)); }
   void approach_ends(double now_s) { aimed_s_ = now_s; } // the gripper is still moving
   double touch_width_mm() const { return rubber_.both_mm(); }
@@ -109,7 +123,9 @@ public:
   // The change of this force by that move, from the width that was last sent.
   double least_move_N(double force_N) const { return rubber_.force_at(target_mm_ - least_mm(), force_N, target_mm_) - force_N; }
   // The predicted grip at the width that was last sent.
-  double coming_N(const GripReadings &readings, double now_s) const;
+  double coming_N(const GripReadings &readings, double now_s) const {
+    return rubber_.force_at(coming_mm(now_s), readings.grip_N, width_at(readings.t_s));
+  }
   // The furthest whole step from the width last sent that keeps the larger of both forces below the cap.
   double last_below_cap_mm(const GripReadings &readings, const GripSettings &settings) const;
   // The nearest width within all caps.
@@ -132,10 +148,16 @@ public:
   bool continue_detour(double now_s, double frame_s);
 
 private:
-  double coming_mm(double now_s) const;
+  // The width at which the gripper will stop. At rest it makes no move shorter than its deadband.
+  double coming_mm(double now_s) const {
+    const bool stays = has_stopped(now_s) && std::abs(status_.width_mm - target_mm_) <= traits_.deadband_mm + 1e-9;
+    return stays ? status_.width_mm : target_mm_;
+  }
   // Steps to this force, closing positive; force_N is the force at from_mm.
-  double steps_off(double wanted_N, double force_N, double from_mm, double coming_mm) const;
-  bool can_detour(const GripReadings &readings) const;
+  double steps_off(double wanted_N, double force_N, double from_mm, double coming_mm) const {
+    return (coming_mm - rubber_.width_for(wanted_N, force_N, from_mm)) / traits_.step_mm;
+  }
+  bool can_detour(const GripReadings &readings) const { return least_mm() > traits_.step_mm && !readings.is_alone() && !readings.over; }
   void begin_detour(double to_mm, double now_s);
   double travel_below_cap_mm(const GripReadings &readings, const GripSettings &settings, double coming_mm) const;
   double nearest_steps(double off, double least_mm, bool may_detour) const;
@@ -152,8 +174,10 @@ private:
   };
   void learn(const GripReadings &readings, const GripSettings &settings, double now_s);
   Outlook predict(const GripAim &aim, const GripReadings &readings, double now_s) const;
-  double force_at(const Outlook &outlook, double width_mm) const;
-  double steps_to(const Outlook &outlook, double wanted_N) const;
+  double force_at(const Outlook &outlook, double width_mm) const { return rubber_.force_at(width_mm, outlook.force_N, outlook.width_mm); }
+  double steps_to(const Outlook &outlook, double wanted_N) const {
+    return steps_off(wanted_N, outlook.force_N, outlook.width_mm, outlook.coming_mm);
+  }
   double whole_steps(double mm) const { return traits_.step_mm * std::floor(mm / traits_.step_mm); } // rounded down, in mm
   // The widths to close and to open to. closed_mm reports a cap that shortens the move.
   double closed_mm(const Outlook &outlook, const GripAim &aim, const GripReadings &readings, const GripSettings &settings,
