@@ -1,7 +1,7 @@
 /** The buttons of the page and of each fingertip. */
 import { Capability } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
-import { MAIN, button, element, wordsOf } from '../view/elements';
+import { beginning, button, element, wordsOf } from '../view/elements';
 import type { App } from './app';
 import { calibrate } from './calibrate';
 import { examine } from './doctor';
@@ -32,8 +32,11 @@ export function pageControls(app: App): HTMLElement {
   return element(
     'div',
     { class: 'controls', role: 'group', 'aria-label': 'Page' },
-    button('Connect', () => void app.connect(), MAIN),
-    button('Simulate', () => app.simulate()),
+    ...beginning(
+      ['Connect', 'Simulate'],
+      () => void app.connect(),
+      () => app.simulate(),
+    ),
     button('Replay a file', () => input.click()),
     input,
   );

@@ -57,12 +57,12 @@ export class PadPicture {
     const alarm = palette.of(scene.alarm === 'moves' ? 'warning' : 'bad');
     this.slab(padSize(scene.layout), scene.alarm ? mix(rubber, alarm, 0.55) : rubber);
     this.sensors(scene);
-    this.found(scene);
     scene.trail.forEach((past, i) => {
       const share = 0.75 * ((i + 1) / scene.trail.length);
       this.shape(circle(past.x_mm, past.y_mm, 0, 0.4, 12), palette.of('accent'), share);
     });
     this.solids(scene, rubber);
+    this.found(scene);
     if (scene.truth) {
       const { x_mm, y_mm } = scene.truth;
       this.outline(circle(x_mm, y_mm, 0, 3.4), palette.of('good'), 0.3);

@@ -66,7 +66,7 @@ export class Traces {
   private finger = 0;
   private width = 0;
   private height = 0;
-  private names: string[] = [];
+  private names: string | null = null;
   /** Rows of the strip of flags: the most until now, so that plots do not jump as flags come and go. */
   private rows = 2;
   /** Its size is another: draw it again, in a pause too. */
@@ -319,10 +319,11 @@ export class Traces {
       this.strip.height = Math.round(height * dense);
       this.strip.style.height = `${height}px`;
     }
-    const names = rows.filter((row) => row.spans.length > 0).map((row) => row.name);
-    if (names.join() !== this.names.join()) {
+    const set = rows.filter((row) => row.spans.length > 0).map((row) => row.name);
+    const names = `Flags in this time: ${set.join(', ') || 'none'}`;
+    if (names !== this.names) {
       this.names = names;
-      this.strip.setAttribute('aria-label', `Flags in this time: ${names.join(', ') || 'none'}`);
+      this.strip.setAttribute('aria-label', names);
     }
     pen.setTransform(dense, 0, 0, dense, 0, 0);
     pen.clearRect(0, 0, this.width, height);

@@ -6,7 +6,7 @@ import '../styles/page.css';
 import '../styles/steps.css';
 import type { Fingertip } from '../model/fingertip';
 import type { History } from '../model/history';
-import { button, element, write } from './elements';
+import { beginning, button, element, write } from './elements';
 import { HealthPanel } from './health';
 import { factsOf } from './health_facts';
 import { leaving } from './notices';
@@ -188,6 +188,7 @@ export class View {
   }
 
   private welcomeOf(): HTMLElement {
+    const words = ['Connect a fingertip', 'Try the simulated one'] as const;
     return element(
       'section',
       { class: 'welcome', 'aria-label': 'Begin' },
@@ -198,12 +199,7 @@ export class View {
         'This page shows where a soft fingertip with fifteen pressure sensors is touched, how hard, and whether ' +
           'the thing slips. Plug one in, or try it without: a simulated one runs the same firmware in this page.',
       ),
-      element(
-        'div',
-        { class: 'begin' },
-        button('Connect a fingertip', () => this.controls.connect(), { class: 'main' }),
-        button('Try the simulated one', () => this.controls.simulate()),
-      ),
+      element('div', { class: 'begin' }, ...beginning(words, this.controls.connect, this.controls.simulate)),
       element('p', { class: 'hint' }, 'Or drop a recording here. Nothing leaves this computer.'),
     );
   }
