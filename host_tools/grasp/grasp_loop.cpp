@@ -91,12 +91,6 @@ void GraspLoop::put(GraspNews news) {
   filled_.set();
 }
 
-void GraspLoop::rethrow() const {
-  for (const auto &loop : loops_) {
-    loop->rethrow();
-  }
-}
-
 void GraspLoop::run() {
   while (!end_) {
     take_devices();

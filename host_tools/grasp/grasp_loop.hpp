@@ -87,7 +87,11 @@ public:
   // The width stays, streams end; news come until the one of kind ended.
   void end() { end_ = true; }
   // After it: what ended a fingertip, if it was an error.
-  void rethrow() const;
+  void rethrow() const {
+    for (const auto &loop : loops_) {
+      loop->rethrow();
+    }
+  }
 
 private:
   void run();

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 
 namespace fingertip {
@@ -54,7 +53,6 @@ std::optional<Packet> take_packet(Bytes *bytes, std::size_t *skipped) {
 
 using namespace feetech;
 
-constexpr double COUNT_rad = 2 * std::numbers::pi / COUNTS_PER_TURN;
 constexpr double STALL_Nm = 1.9, FULL_SPEED_rad_s = 4.7; // 45 revolutions a minute, at 7.4 V
 constexpr double LEAST_TORQUE = 0.05;                    // of the stall's, below it does not turn
 constexpr double USUAL_OPEN = 652;                       // counts: a radian
@@ -74,23 +72,6 @@ static int word(const Bytes &bytes, std::size_t at) { return bytes[at] | bytes[a
 static void put_word(Bytes *bytes, int value) {
   bytes->push_back(static_cast<std::uint8_t>(value & 0xFF));
   bytes->push_back(static_cast<std::uint8_t>(value >> 8));
-}
-
-double Jaw::step_mm() const { return jaw_mm_ * COUNT_rad; }
-
-double Jaw::width_mm(double count) const {
-  const double turned = open_ > closed_ ? count - closed_ : closed_ - count;
-  return 2 * jaw_mm_ * std::sin(std::clamp(turned * COUNT_rad, -std::numbers::pi, std::numbers::pi) / 2);
-}
-
-double Jaw::count(double width_mm) const {
-  const double turned = 2 * std::asin(std::clamp(width_mm / (2 * jaw_mm_), 0.0, 1.0)) / COUNT_rad;
-  return open_ > closed_ ? closed_ + turned : closed_ - turned;
-}
-
-double Jaw::slope_mm(double width_mm) const {
-  const double sine = std::clamp(width_mm / (2 * jaw_mm_), 0.0, 1.0);
-  return step_mm() * std::sqrt(1 - sine * sine);
 }
 
 GripperTraits feetech_traits(const std::string &model, const GripperWay &complete) {
@@ -135,10 +116,6 @@ AskedLine::Heard FeetechGripper::take(const Bytes &, std::size_t length, Bytes *
 // Two or three bytes: no other answer has so few.
 std::pair<AskedLine::Bytes, std::size_t> FeetechGripper::sure_question(int number) const {
   return {question_of(READ, {MODEL, static_cast<std::uint8_t>(number + 1)}), static_cast<std::size_t>(number + 1)};
-}
-
-Bytes FeetechGripper::question_of(std::uint8_t instruction, const Bytes &parameters) const {
-  return encoded({static_cast<std::uint8_t>(way_.slave), instruction, parameters});
 }
 
 void FeetechGripper::write(std::uint8_t address, const Bytes &values) {

@@ -11,6 +11,10 @@
 
 #include "grasp/gripper/common.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 namespace fingertip::feetech {
 
 constexpr int BAUD = 1'000'000;
@@ -69,15 +73,25 @@ public:
   explicit Jaw(const GripperWay &complete) : closed_(*complete.closed_count), open_(*complete.open_count), jaw_mm_(complete.jaw_mm) {}
 
   double stroke_mm() const { return width_mm(open_); }
-  double step_mm() const; // of one count, closed, where it is the largest
+  double step_mm() const { return jaw_mm_ * COUNT_rad; } // of one count, closed, where it is the largest
   // Below 0 beyond where the pads touch.
-  double width_mm(double count) const;
+  double width_mm(double count) const {
+    const double turned = open_ > closed_ ? count - closed_ : closed_ - count;
+    return 2 * jaw_mm_ * std::sin(std::clamp(turned * COUNT_rad, -std::numbers::pi, std::numbers::pi) / 2);
+  }
   // The count of a width from 0 to the stroke.
-  double count(double width_mm) const;
+  double count(double width_mm) const {
+    const double turned = 2 * std::asin(std::clamp(width_mm / (2 * jaw_mm_), 0.0, 1.0)) / COUNT_rad;
+    return open_ > closed_ ? closed_ + turned : closed_ - turned;
+  }
   // The change of width for one count, at this width.
-  double slope_mm(double width_mm) const;
+  double slope_mm(double width_mm) const {
+    const double sine = std::clamp(width_mm / (2 * jaw_mm_), 0.0, 1.0);
+    return step_mm() * std::sqrt(1 - sine * sine);
+  }
 
 private:
+  static constexpr double COUNT_rad = 2 * std::numbers::pi / feetech::COUNTS_PER_TURN;
   int closed_, open_;
   double jaw_mm_;
 };
@@ -102,7 +116,9 @@ public:
 private:
   Heard take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) override;
   std::pair<Bytes, std::size_t> sure_question(int number) const override;
-  Bytes question_of(std::uint8_t instruction, const Bytes &parameters) const;
+  Bytes question_of(std::uint8_t instruction, const Bytes &parameters) const {
+    return feetech::encoded({static_cast<std::uint8_t>(way_.slave), instruction, parameters});
+  }
   Bytes read(std::uint8_t address, std::uint8_t length) { return exchange(question_of(feetech::READ, {address, length}), length); }
   void write(std::uint8_t address, const Bytes &values);
   void command(double count, int speed, int torque);

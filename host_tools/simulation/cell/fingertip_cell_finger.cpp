@@ -216,11 +216,6 @@ void SharedPressures::put(std::int64_t host_us, const Pressures &pressures) {
   count_.store(count + 1, std::memory_order_release);
 }
 
-std::int64_t SharedPressures::newest_us() const {
-  const std::uint64_t count = count_.load(std::memory_order_acquire);
-  return count == 0 ? 0 : moment(count - 1).host_us.load(std::memory_order_relaxed);
-}
-
 double SharedPressures::at(std::int64_t host_us, std::size_t sensor) const {
   const std::uint64_t count = count_.load(std::memory_order_acquire);
   if (count == 0) {

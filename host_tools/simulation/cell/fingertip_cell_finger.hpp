@@ -21,7 +21,10 @@ public:
   // At this time, later than all before; Pa above what the air presses.
   void put(std::int64_t host_us, const Pressures &pressures);
   // The time of the newest; 0: none yet.
-  std::int64_t newest_us() const;
+  std::int64_t newest_us() const {
+    const std::uint64_t count = count_.load(std::memory_order_acquire);
+    return count == 0 ? 0 : moment(count - 1).host_us.load(std::memory_order_relaxed);
+  }
   // In between straight; before the oldest that is kept, 0.5 s, as then; the same after the newest.
   double at(std::int64_t host_us, std::size_t sensor) const;
 

@@ -139,11 +139,6 @@ void World::watch_object() {
   }
 }
 
-const char *World::columns() {
-  return "world_s,width_mm,force_N,peak_N,load_N,least_N,slid_mm,way_mm,friction,lifted_mm,slips,"
-         "is_there,dropped,crushed";
-}
-
 std::string World::cells() const {
   double load_N = 0.0;
   for (const std::size_t finger : {0U, 1U}) {

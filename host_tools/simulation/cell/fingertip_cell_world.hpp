@@ -53,7 +53,10 @@ public:
   double time_s() const { return time_s_; }
   bool touched() const { return peak_N_ > TOUCHED_N; }
   // The columns of the truth, in order.
-  static const char *columns();
+  static const char *columns() {
+    return "world_s,width_mm,force_N,peak_N,load_N,least_N,slid_mm,way_mm,friction,lifted_mm,slips,"
+           "is_there,dropped,crushed";
+  }
   std::string cells() const;
   // What has happened since it was last asked: "lift", "slick", "slip", "dropped", ...
   std::vector<std::string> take_events() { return std::exchange(events_, {}); }

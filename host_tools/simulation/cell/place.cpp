@@ -125,12 +125,6 @@ void Fingers::wait_until_ready() {
   }
 }
 
-void Fingers::put(std::int64_t host_us, const std::vector<Pressures> &pressures) {
-  for (std::size_t i = 0; i < count(); i++) {
-    shared_[i].put(host_us, pressures[i]);
-  }
-}
-
 void Fingers::share(std::chrono::milliseconds longest_wait) {
   if (server_) {
     server_->step(longest_wait);

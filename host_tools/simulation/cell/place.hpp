@@ -63,7 +63,11 @@ public:
   // Once they know their zeros, and are shared where they are to be. Throws Error: one cannot start, or a signal came.
   void wait_until_ready();
   // At this time, later than all before; [finger].
-  void put(std::int64_t host_us, const std::vector<Pressures> &pressures);
+  void put(std::int64_t host_us, const std::vector<Pressures> &pressures) {
+    for (std::size_t i = 0; i < count(); i++) {
+      shared_[i].put(host_us, pressures[i]);
+    }
+  }
   // Serves the programs that share them, waiting at most this long for one.
   void share(std::chrono::milliseconds longest_wait);
 
