@@ -17,10 +17,8 @@ That of a lift in host_tools/README.md is of the firmware on the host:
     simulation/player/fingertip_player play lift_scenario.csv -o lift.csv --raw --pad 12 --rate 200
     /usr/bin/python3 ../../../host_tools/demo/picture.py lift.csv --at 17.2 -o ../../../host_tools/demo/lift.png
 
-So is that of a grasp there, in two terminals:
+So is that of a grasp there, recorded for seven seconds by the commands of host_tools/simulation/cell/README.md:
 
-    fingertip simulate --lift --ports cell --then slick:0.6@1
-    FINGERTIP_PORT=cell/left:cell/right fingertip grasp --gripper 2f85 --gripper-port cell/gripper --seconds 7 -o grasp.csv
     /usr/bin/python3 host_tools/demo/picture.py grasp.csv --at 0.6 --until 5.4 --every 0.2 -o host_tools/demo/grasp_screen.png
 """
 
