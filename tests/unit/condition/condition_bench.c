@@ -59,6 +59,11 @@ void press(int32_t peak) {
   }
 }
 
+void hold(int32_t peak, float seconds) {
+  press(peak);
+  run_s(seconds);
+}
+
 void begin(uint32_t frame_period_us) {
   condition_start(&condition);
   memset(&frame, 0, sizeof frame);

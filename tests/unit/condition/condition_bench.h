@@ -31,6 +31,7 @@ void watch_s(float seconds, float slope_Pa_s, uint32_t sensors);
 /* A bump like that of a contact above sensor 7, up to 1. */
 float bump(int k);
 void press(int32_t peak);
+void hold(int32_t peak, float seconds);
 void begin(uint32_t frame_period_us);
 
 /* Tared and warm. */

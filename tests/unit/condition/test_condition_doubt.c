@@ -20,12 +20,13 @@ TEST(test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt) {
   }
 }
 
-static void press_in_steps(int32_t from, int32_t to, float seconds) {
+static void press_in_steps(int32_t from, int32_t to, float seconds, float then_s) {
   int count = frames_in(seconds);
   for (int i = 1; i <= count; i++) {
     press(from + (to - from) / count * i);
     run(1);
   }
+  run_s(then_s);
 }
 
 /* Held, a touch that the band lets in part into the zero comes out of the band: what the zero took
@@ -33,30 +34,23 @@ static void press_in_steps(int32_t from, int32_t to, float seconds) {
 TEST(test_a_touch_that_a_zero_took_part_of_stays_in_doubt) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin_calm(periods_us[i]);
-    press_in_steps(0, 47000 * Pa, 0.2f);
-    run_s(4);
-    press_in_steps(47000 * Pa, 0, 0.1f);
-    run_s(1.2f);
-    press_in_steps(0, 5100 * Pa, 0.15f);
+    press_in_steps(0, 47000 * Pa, 0.2f, 4);
+    press_in_steps(47000 * Pa, 0, 0.1f, 1.2f);
+    press_in_steps(0, 5100 * Pa, 0.15f, 0);
     watch_s(0.7f, 0, 0);
     TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
     watch_s(6, 0, 0);
     TEST_ASSERT_TRUE(conditioned.contact);
     TEST_ASSERT_LESS_THAN_INT32(4000 * Pa, conditioned.peak_Pa_q10);
     TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
-    press_in_steps(5100 * Pa, 15000 * Pa, 0.2f);
-    run_s(1);
+    press_in_steps(5100 * Pa, 15000 * Pa, 0.2f, 1);
     TEST_ASSERT_TRUE(conditioned.zero_doubtful);
-    press_in_steps(15000 * Pa, 47000 * Pa, 0.2f);
-    run_s(1);
+    press_in_steps(15000 * Pa, 47000 * Pa, 0.2f, 1);
     TEST_ASSERT_FALSE(conditioned.zero_doubtful);
-    press_in_steps(47000 * Pa, 5100 * Pa, 0.2f);
-    run_s(0.1f);
+    press_in_steps(47000 * Pa, 5100 * Pa, 0.2f, 0.1f);
     TEST_ASSERT_TRUE(conditioned.zero_doubtful);
-    press(0);
-    run_s(5);
-    press_in_steps(0, 20000 * Pa, 0.1f);
-    run_s(1);
+    hold(0, 5);
+    press_in_steps(0, 20000 * Pa, 0.1f, 1);
     TEST_ASSERT_FALSE(conditioned.zero_doubtful);
   }
 }
@@ -69,10 +63,8 @@ TEST(test_presses_in_quick_succession_move_no_zero) {
       begin_calm(periods_us[i]);
       int32_t worst = 0;
       for (int touches = 0; touches < 10; touches++) {
-        press_in_steps(0, 20000 * Pa, 0.1f);
-        run_s(0.2f);
-        press_in_steps(20000 * Pa, 0, falls_s[j]);
-        run_s(0.1f);
+        press_in_steps(0, 20000 * Pa, 0.1f, 0.2f);
+        press_in_steps(20000 * Pa, 0, falls_s[j], 0.1f);
         int32_t off = condition.zero_Pa_q10[7] - AMBIENT;
         worst = off > worst ? off : worst;
       }
@@ -158,8 +150,7 @@ TEST(test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not) {
 TEST(test_one_sensor_is_not_tared_in_a_contact_unless_that_lasts) {
   for (int lasts = 0; lasts < 2; lasts++) {
     begin_calm(4854);
-    press(20000 * Pa);
-    run_s(0.5f);
+    hold(20000 * Pa, 0.5f);
     frame.renewed = 1u << 8;
     run(1);
     frame.renewed = 0;
@@ -178,8 +169,7 @@ TEST(test_one_sensor_is_not_tared_in_a_contact_unless_that_lasts) {
     TEST_ASSERT_EQUAL_HEX32(ALL, conditioned.usable);
     TEST_ASSERT_EQUAL_INT32(AMBIENT, condition.zero_Pa_q10[8]);
     TEST_ASSERT_TRUE(lasts || conditioned.tared);
-    press(20000 * Pa);
-    run_s(0.5f);
+    hold(20000 * Pa, 0.5f);
     TEST_ASSERT_TRUE(conditioned.tared);
     TEST_ASSERT_FALSE(conditioned.zero_doubtful);
   }

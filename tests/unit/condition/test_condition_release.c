@@ -28,8 +28,7 @@ TEST(test_what_rubber_does_after_a_release_is_no_contact) {
     for (size_t s = 0; s < sizeof shares / sizeof shares[0]; s++) {
       for (size_t t = 0; t < 3; t++) {
         begin_calm(periods_us[i]);
-        press(20000 * Pa);
-        run_s(5);
+        hold(20000 * Pa, 5);
         release(shares[s], times_s[t], 40);
         TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
         TEST_ASSERT_TRUE(contact_s < 6);
@@ -54,11 +53,9 @@ TEST(test_a_force_left_after_a_release_is_flagged) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (size_t s = 0; s < 3; s++) {
       begin_calm(periods_us[i]);
-      press(20000 * Pa);
-      run_s(5);
+      hold(20000 * Pa, 5);
       float flagged_s = 0;
-      press((int32_t)(shares[s] * 20000) * Pa);
-      run_s(0.2f);
+      hold((int32_t)(shares[s] * 20000) * Pa, 0.2f);
       for (int j = 0; j < 59; j++) {
         run_s(1);
         flagged_s += conditioned.zero_doubtful ? 1 : 0;
@@ -67,8 +64,7 @@ TEST(test_a_force_left_after_a_release_is_flagged) {
     }
     /* More than an eighth is a contact without doubt. */
     begin_calm(periods_us[i]);
-    press(20000 * Pa);
-    run_s(5);
+    hold(20000 * Pa, 5);
     press(3000 * Pa);
     watch_s(60, 0, 0);
     TEST_ASSERT_FLOAT_WITHIN(0.1f, 60, unflagged_s);
@@ -79,18 +75,15 @@ TEST(test_a_force_left_after_a_release_is_flagged) {
 TEST(test_press_after_a_release_is_not_taken_for_a_remainder) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin_calm(periods_us[i]);
-    press(20000 * Pa);
-    run_s(5);
-    press(0);
-    run_s(3);
+    hold(20000 * Pa, 5);
+    hold(0, 3);
     TEST_ASSERT_FALSE(conditioned.contact);
     press(800 * Pa); /* within the band: in doubt, but not eaten */
     watch_s(2, 0, 0);
     TEST_ASSERT_TRUE(conditioned.contact);
     TEST_ASSERT_TRUE(conditioned.zero_doubtful);
     TEST_ASSERT_INT32_WITHIN(100 * Pa, 800 * Pa, conditioned.peak_Pa_q10);
-    press(0);
-    run_s(1);
+    hold(0, 1);
     press(2000 * Pa);
     watch_s(5, 0, 0);
     TEST_ASSERT_FLOAT_WITHIN(0.1f, 5, unflagged_s);
@@ -103,31 +96,24 @@ TEST(test_a_press_proves_the_zero_that_it_leaves) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (int more = 0; more <= 1; more++) {
       begin_calm(periods_us[i]);
-      press(20000 * Pa);
-      run_s(5);
-      press(600 * Pa);
-      run_s(10);
+      hold(20000 * Pa, 5);
+      hold(600 * Pa, 10);
       TEST_ASSERT_TRUE(conditioned.zero_doubtful);
       TEST_ASSERT_FALSE(conditioned.contact);
-      press(20000 * Pa);
-      run_s(5);
+      hold(20000 * Pa, 5);
       TEST_ASSERT_FALSE(conditioned.zero_doubtful);
-      press((more ? 1200 : 750) * Pa);
-      run_s(3);
+      hold((more ? 1200 : 750) * Pa, 3);
       TEST_ASSERT_FALSE(conditioned.contact);
       TEST_ASSERT_EQUAL(more, conditioned.zero_doubtful);
     }
     begin_calm(periods_us[i]); /* A press that is in doubt itself proves nothing. */
-    press(20000 * Pa);
-    run_s(5);
-    press(600 * Pa);
-    run_s(10);
+    hold(20000 * Pa, 5);
+    hold(600 * Pa, 10);
     press(2000 * Pa);
     watch_s(5, 0, 0);
     TEST_ASSERT_TRUE(conditioned.contact);
     TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
-    press(600 * Pa);
-    run_s(3);
+    hold(600 * Pa, 3);
     TEST_ASSERT_TRUE(conditioned.zero_doubtful);
   }
 }
@@ -135,8 +121,7 @@ TEST(test_a_press_proves_the_zero_that_it_leaves) {
 /* Presses of 20 kPa, after each of which sensor 7 alone keeps this. */
 static void keep(int presses, float share, float time_constant_s, float seconds) {
   for (; presses > 0; presses--) {
-    press(20000 * Pa);
-    run_s(3);
+    hold(20000 * Pa, 3);
     contact_s = unflagged_s = 0;
     fill(AMBIENT);
     for (int i = 0; i < frames_in(seconds); i++) {
@@ -164,18 +149,13 @@ TEST(test_a_force_that_is_left_again_and_again_stays_a_force) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
     begin_calm(periods_us[i / 2]);
     for (int n = 0; n < 10; n++) {
-      press(20000 * Pa);
-      run_s(5);
-      press((n > 0 || i % 2 ? 2000 : 0) * Pa);
-      run_s(3);
+      hold(20000 * Pa, 5);
+      hold((n > 0 || i % 2 ? 2000 : 0) * Pa, 3);
       frame.valid = i % 2 ? ALL : ALL & ~(1u << 6); /* which kept nothing before it failed */
-      press(0);
-      run_s(10);
+      hold(0, 10);
     }
-    press(20000 * Pa);
-    run_s(5);
-    press(4000 * Pa);
-    run_s(1);
+    hold(20000 * Pa, 5);
+    hold(4000 * Pa, 1);
     watch_s(5, 0, 0);
     TEST_ASSERT_FLOAT_WITHIN(0.1f, 5, unflagged_s);
   }
@@ -186,8 +166,7 @@ TEST(test_what_stands_off_at_a_touch_fades_in_the_contact) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (int sign = -1; sign <= 1; sign += 2) {
       begin_calm(periods_us[i]);
-      press(20000 * Pa);
-      run_s(5);
+      hold(20000 * Pa, 5);
       release(0.04f * (float)sign, 3, 1);
       const float left_Pa = 800.0f * (float)sign * expf(-1.0f / 3.0f);
       for (int tenth = 0; tenth < 60; tenth++) {
@@ -205,12 +184,10 @@ TEST(test_what_many_presses_leave_fades_in_the_next_one) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin_calm(periods_us[i]);
     for (int n = 0; n < 40; n++) {
-      press(20000 * Pa);
-      run_s(1);
+      hold(20000 * Pa, 1);
       release(0.03f, 3, 1.2f);
     }
-    press(8000 * Pa);
-    run_s(12);
+    hold(8000 * Pa, 12);
     TEST_ASSERT_INT32_WITHIN(30 * Pa, 8000 * Pa, conditioned.pressure_Pa_q10[7]);
   }
 }
@@ -219,8 +196,7 @@ TEST(test_what_many_presses_leave_fades_in_the_next_one) {
 TEST(test_a_sensor_that_settles_after_a_press_rests_there) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
     begin_calm(periods_us[i / 2]);
-    press(20000 * Pa);
-    run_s(1);
+    hold(20000 * Pa, 1);
     frame.renewed = i % 2 ? 1u << 7 : 0;
     run(1);
     press(0);
@@ -243,8 +219,7 @@ TEST(test_what_a_sensor_keeps_shows_after_the_press_alone) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
     begin(periods_us[i / 2]);
     run_s(i % 2 ? 1 : 60);
-    press(20000 * Pa);
-    run_s(3);
+    hold(20000 * Pa, 3);
     press(0);
     frame.valid = i % 2 ? ALL : ALL & ~(1u << 7);
     run_s(5);
@@ -260,8 +235,7 @@ TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin_calm(periods_us[i]);
     TEST_ASSERT_EQUAL(0, condition.past_sd_Pa_q10[7]);
-    press(20000 * Pa);
-    run_s(3);
+    hold(20000 * Pa, 3);
     TEST_ASSERT_INT32_WITHIN(30 * Pa, (int32_t)(0.02f * 20000 * (1.0f - expf(-1.0f))) * Pa, condition.past_sd_Pa_q10[7]);
     press(0);
     frame.pressure_Pa_q10[1] += 20000 * Pa; /* the contact moves on */
@@ -272,10 +246,8 @@ TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
     run_s(30);
     TEST_ASSERT_INT32_WITHIN(Pa, 0, condition.past_sd_Pa_q10[7]);
     keep(12, -0.1f, 3, 5);
-    press(20000 * Pa);
-    run_s(1);
-    press(0);
-    run_s(0.15f);
+    hold(20000 * Pa, 1);
+    hold(0, 0.15f);
     TEST_ASSERT_INT32_WITHIN(500 * Pa, 2400 * Pa, condition.past_sd_Pa_q10[7]);
     TEST_ASSERT_TRUE(condition.past_sd_Pa_q10[4] * 5 < condition.past_sd_Pa_q10[7]);
   }

@@ -103,8 +103,7 @@ TEST(test_a_light_touch_is_seen_once_zeros_have_settled) {
     begin(periods_us[i]);
     run_s(2.5f);
     assert_touch_of_is_seen(300 * Pa);
-    press(0);
-    run_s(3);
+    hold(0, 3);
     condition_tare(&condition);
     run(ZERO_TARE_FRAMES + 1);
     TEST_ASSERT_TRUE(conditioned.tared);
@@ -164,8 +163,7 @@ TEST(test_zero_follows_any_drift_of_a_barometer) {
 TEST(test_a_tare_under_a_press_is_mended_for_all_sensors) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin(periods_us[i]);
-    press(5000 * Pa);
-    run_s(40);
+    hold(5000 * Pa, 40);
     fill(AMBIENT);
     run_s(3);
     for (int t = 3; t < 60; t++) {
@@ -234,12 +232,10 @@ TEST(test_other_changes_are_learnt_as_no_drift) {
     TEST_ASSERT_INT32_WITHIN(10 * Pa, began, condition.zero_Pa_q10[7]);
 
     begin_calm(periods_us[i]);
-    press(20000 * Pa);
-    run_s(5);
+    hold(20000 * Pa, 5);
     release(0.03f, 10, 58);
     began = condition.zero_Pa_q10[7];
-    press(10000 * Pa);
-    run_s(3000);
+    hold(10000 * Pa, 3000);
     TEST_ASSERT_INT32_WITHIN(10 * Pa, began, condition.zero_Pa_q10[7]);
   }
   begin_calm(4854); /* nor a slow press */

@@ -77,18 +77,21 @@ static void expect(uint32_t valid, uint32_t left_out) {
   TEST_ASSERT_EQUAL_UINT32(left_out, readings.left_out);
 }
 
+static void take_and_expect(uint32_t good, uint32_t valid, uint32_t left_out) {
+  take_pressures(good);
+  expect(valid, left_out);
+}
+
 TEST(test_a_step_of_one_sensor_alone_is_left_out_of_its_frame) {
   static const double steps_Pa[] = {9e3, -9e3, 60e3, -60e3, 150e3};
   for (int i = 0; i < 5 * SENSORS; i++) {
     next_case();
     const int one = i / 5;
     step_by(one, steps_Pa[i % 5]);
-    take_pressures(ALL);
-    expect(ALL & ~(1u << one), 1);
+    take_and_expect(ALL, ALL & ~(1u << one), 1);
     TEST_ASSERT_EQUAL_HEX32(0, frame.saturated);
     step_by(one, -steps_Pa[i % 5]);
-    take_pressures(ALL);
-    expect(ALL, 1);
+    take_and_expect(ALL, ALL, 1);
     TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
   }
 }
@@ -97,20 +100,17 @@ TEST(test_a_sensor_that_stays_where_it_stepped_is_suspect_until_it_returns) {
   start();
   step_by(ONE, 12e3);
   take_pressures(ALL);
-  take_pressures(ALL);
-  expect(ALL & ~ONE_BIT, 2);
+  take_and_expect(ALL, ALL & ~ONE_BIT, 2);
   TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
   for (int i = 0; i < 10; i++) {
-    take_pressures(ALL);
-    expect(ALL & ~ONE_BIT, 2);
+    take_and_expect(ALL, ALL & ~ONE_BIT, 2);
   }
   take_temperature();
   TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
   temperature.returned = ONE_BIT;
   take_temperature();
   TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
-  take_pressures(ALL);
-  expect(ALL, 2);
+  take_and_expect(ALL, ALL, 2);
 }
 
 /* Also after frames in which it had no reading. */
@@ -134,15 +134,13 @@ TEST(test_a_step_that_another_measures_counts_at_once) {
     TEST_ASSERT_EQUAL_HEX32(fast ? ONE_BIT : 0, frame.doubtful & frame.unsettled);
   }
   take_temperature();
-  take_pressures(ALL);
-  expect(ALL, 0);
+  take_and_expect(ALL, ALL, 0);
   step_by(ONE, -6.4e3);
   step_by(ONE + 1, -300);
   take_pressures(ALL); /* as if it had lost its state: its temperature has not */
   TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.doubtful & frame.unsettled);
   take_temperature();
-  take_pressures(ALL);
-  expect(ALL, 0);
+  take_and_expect(ALL, ALL, 0);
   TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
 }
 
@@ -152,8 +150,7 @@ TEST(test_where_presses_are_not_shared_or_a_sensor_is_missing_every_step_counts)
     next_case();
     readings.presses_are_shared = missing != 0;
     step_by(ONE, 60e3);
-    take_pressures(ALL & ~missing);
-    expect(ALL & ~missing, 0);
+    take_and_expect(ALL & ~missing, ALL & ~missing, 0);
   }
 }
 
@@ -162,11 +159,9 @@ TEST(test_a_step_after_an_admission_between_frames_is_left_out) {
   start();
   temperature.returned = ONE_BIT;
   take_temperature();
-  take_pressures(ALL);
-  expect(ALL, 0);
+  take_and_expect(ALL, ALL, 0);
   step_by(ONE, -17000);
-  take_pressures(ALL);
-  expect(ALL & ~ONE_BIT, 1);
+  take_and_expect(ALL, ALL & ~ONE_BIT, 1);
 }
 
 /* Once: its zero may have been taken meanwhile. */
@@ -198,8 +193,7 @@ TEST(test_a_step_alone_at_a_reset_is_reported) {
     temperature.returned = ALL;
     take_temperature();
     temperature.returned = 0;
-    take_pressures(ALL & ~1u); /* another is still missing */
-    expect(ALL & ~1u, 0);
+    take_and_expect(ALL & ~1u, ALL & ~1u, 0); /* another is still missing */
     TEST_ASSERT_EQUAL_HEX32(shared ? 0 : ONE_BIT, frame.restored);
     take_pressures(ALL);
     TEST_ASSERT_EQUAL_HEX32(0, frame.restored);
@@ -253,18 +247,15 @@ TEST(test_pressures_below_zero_are_left_out_and_the_second_makes_a_suspect) {
   start();
   step_by(ONE, -190e3);
   step_by(ONE + 1, 1000);
-  take_pressures(ALL);
-  expect(ALL & ~ONE_BIT, 1);
+  take_and_expect(ALL, ALL & ~ONE_BIT, 1);
   step_by(ONE, 190e3);
-  take_pressures(ALL);
-  expect(ALL, 1);
+  take_and_expect(ALL, ALL, 1);
   step_by(ONE, -190e3);
   step_by(ONE + 1, 1000);
   take_pressures(ALL);
   TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
   take_pressures(ALL & ~ONE_BIT);
-  take_pressures(ALL);
-  expect(ALL & ~ONE_BIT, 3);
+  take_and_expect(ALL, ALL & ~ONE_BIT, 3);
   TEST_ASSERT_EQUAL_HEX32(ONE_BIT, readings.suspects);
 }
 
@@ -279,8 +270,7 @@ TEST(test_a_temperature_step_needs_a_second_and_makes_a_suspect) {
     const double rest_Pa = true_Pa(ONE, rest);
     warm_by(ONE, cases[i].first_degC);
     TEST_ASSERT_EQUAL_HEX32(READINGS_ASK_AGAIN, take_temperature());
-    take_pressures(ALL);
-    expect(ALL, 0);
+    take_and_expect(ALL, ALL, 0);
     TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.doubtful);
     TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.unsettled);
     TEST_ASSERT_DOUBLE_WITHIN(0.01, rest_Pa, frame.pressure_Pa_q10[ONE] / 1024.0);
@@ -306,8 +296,7 @@ TEST(test_a_step_of_all_temperatures_makes_all_suspects) {
       warm_by(k, -3.0);
       step_by(k, -7000.0 * fell);
     }
-    take_pressures(ALL);
-    expect(ALL, 0);
+    take_and_expect(ALL, ALL, 0);
     TEST_ASSERT_EQUAL_HEX32(fell ? ALL : 0, frame.doubtful);
     take_temperature();
     TEST_ASSERT_EQUAL_HEX32(fell ? ALL : 0, readings.suspects);
@@ -344,28 +333,24 @@ TEST(test_a_first_temperature_far_from_the_others_is_believed_after_two_resets) 
     temperature.returned = ONE_BIT;
     take_temperature();
     TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
-    take_pressures(ALL);
-    expect(ALL & ~ONE_BIT, 0);
+    take_and_expect(ALL, ALL & ~ONE_BIT, 0);
   }
   take_temperature();
   TEST_ASSERT_EQUAL_HEX32(0, readings.suspects);
-  take_pressures(ALL);
-  expect(ALL, 0);
+  take_and_expect(ALL, ALL, 0);
   TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.doubtful);
   TEST_ASSERT_EQUAL_HEX32(0, frame.unsettled);
   warm_by(ONE, -12);
   temperature.returned = ONE_BIT;
   take_temperature();
-  take_pressures(ALL);
-  expect(ALL, 0);
+  take_and_expect(ALL, ALL, 0);
   TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
 }
 
 static void look_again(double warmer_degC, uint32_t doubtful) {
   warm_by(ONE, warmer_degC);
   take_temperature();
-  take_pressures(ALL);
-  expect(ALL, 0);
+  take_and_expect(ALL, ALL, 0);
   TEST_ASSERT_EQUAL_HEX32(doubtful, frame.doubtful);
 }
 
@@ -390,8 +375,7 @@ TEST(test_a_temperature_at_which_no_sensor_works_is_never_used) {
   warm_by(ONE, 90);
   for (int i = 0; i < 10; i++) {
     take_temperature();
-    take_pressures(ALL);
-    expect(ALL & ~ONE_BIT, 0);
+    take_and_expect(ALL, ALL & ~ONE_BIT, 0);
     temperature.returned = readings.suspects;
   }
 }
@@ -421,12 +405,10 @@ TEST(test_a_sensor_with_a_bad_prom_must_read_like_the_others) {
     step_by(ONE, cases[i].apart_Pa);
     for (int n = 0; n < 2; n++) {
       take_temperature();
-      take_pressures(ALL);
-      expect(ALL & ~ONE_BIT, 0);
+      take_and_expect(ALL, ALL & ~ONE_BIT, 0);
     }
     take_temperature();
-    take_pressures(ALL);
-    expect(cases[i].used ? ALL : ALL & ~ONE_BIT, 0);
+    take_and_expect(ALL, cases[i].used ? ALL : ALL & ~ONE_BIT, 0);
     TEST_ASSERT_EQUAL_HEX32(cases[i].used ? ONE_BIT : 0, frame.doubtful);
     TEST_ASSERT_EQUAL_HEX32(0, frame.unsettled);
     /* Once it did, presses do not matter. */
@@ -434,7 +416,6 @@ TEST(test_a_sensor_with_a_bad_prom_must_read_like_the_others) {
       step_by(k, k == ONE ? 40e3 : 8e3);
     }
     take_temperature();
-    take_pressures(ALL);
-    expect(cases[i].used ? ALL : ALL & ~ONE_BIT, 0);
+    take_and_expect(ALL, cases[i].used ? ALL : ALL & ~ONE_BIT, 0);
   }
 }
