@@ -14,13 +14,13 @@ import { Bench } from '../../host_tools/report/fit/on_chip/fit_on_chip.mjs';
 /** The build's iterations from cold, with everything: readings, guess, amplitude, force, errors, what rubber keeps, shape, flags. */
 const COLD_CYCLES_MAX = 31500;
 /** The same without some of the sensors. */
-const MASKED_CYCLES_MAX = 50100;
+const MASKED_CYCLES_MAX = 49300;
 /** A fit with every sensor that looks for an outlier and finds none. */
-const SEARCH_CYCLES_MAX = 46900;
+const SEARCH_CYCLES_MAX = 46600;
 /** A fit that finds an outlier: the fit, the search, and the fit without it. */
-const OUTLIER_CYCLES_MAX = 97600;
+const OUTLIER_CYCLES_MAX = 96500;
 /** A frame's tangential estimate, which follows the fit, with the image's pad. */
-const TANGENTIAL_CYCLES_MAX = 43100;
+const TANGENTIAL_CYCLES_MAX = 43000;
 /** A part of the look for a load that is not estimated, which follows the frame's packet (fit_doubt.h), and all of them. */
 const LOAD_PART_CYCLES_MAX = 6700;
 const LOAD_CYCLES_MAX = 25000;
