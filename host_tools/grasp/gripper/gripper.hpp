@@ -27,7 +27,7 @@
 
 namespace fingertip {
 
-/* The driver of a gripper, and so its kind: a screw drive behind Modbus registers, or a servo that turns a jaw. */
+/* A gripper's kind: a Robotiq's screw drive, or a servo that turns a jaw. */
 enum class GripperDriver { robotiq, feetech };
 
 struct GripperTraits : fingertip_grip_traits {
@@ -41,7 +41,7 @@ struct GripperStatus {
   bool moving = false;        // or activating
   std::optional<bool> object; // what the gripper itself believes; empty while it moves
   double width_mm = 0.0;
-  double current_A = 0.0; // of its motor, as a number without sign
+  double current_A = 0.0; // of its motor, as a number without sign; 0 by a URCap, which does not have it
   std::uint8_t fault = 0; // the maker's code; 0: none
   // The gripper got no question for a second or more before this exchange. No fault: a gripper that reports this goes on.
   bool was_left_alone = false;
@@ -74,7 +74,7 @@ public:
 struct GripperWay {
   std::string model = {}; // one of gripper_models()
   std::string port = {};  // of a serial line; of a Robotiq on a UR arm: "ur:HOST" (robotiq_urcap.hpp)
-  int slave = 0;          // 0: the model's usual
+  int slave = 0;          // 0: the model's usual; "ur:" has none
   // Positions that the gripper reports when its pads touch and when it is open; empty: the model's
   // defaults. Of a Robotiq 0 to 255, of a servo 0 to 4095, which may turn either way.
   std::optional<int> closed_count = {}, open_count = {};

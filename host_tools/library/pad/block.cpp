@@ -566,11 +566,14 @@ std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place
       }
     }
     const std::size_t finished = ++done;
-    if (on_progress && std::this_thread::get_id() == caller) {
+    if (on_progress && finished < places.size() && std::this_thread::get_id() == caller) {
       on_progress(static_cast<double>(finished) / static_cast<double>(places.size()));
     }
   };
   in_parallel(places.size(), solve, std::max(1u, std::thread::hardware_concurrency()));
+  if (on_progress) {
+    on_progress(1.0);
+  }
   return answers;
 }
 

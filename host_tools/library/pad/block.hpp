@@ -64,7 +64,7 @@ Cubic cubic_at(double at, int nodes);
 int block_nodes(double half_mm, double step_mm);
 
 // For each place on the base; one closer than 3 mm to a side asks for smaller elements. Runs on all processors. on_progress gets the share
-// done, 0..1, on the calling thread. Throws std::runtime_error if conjugate gradients do not end.
+// done, on the calling thread, and 1 in the end. Throws std::runtime_error if conjugate gradients do not end.
 std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place> &places, double step_mm, const BlockGrid &grid = {},
                                      const std::function<void(double)> &on_progress = {});
 

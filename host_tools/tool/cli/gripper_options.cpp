@@ -20,7 +20,7 @@ static std::string only_port() {
 }
 
 void with_gripper_line(CLI::App *command, GripperWay &way) {
-  with_value(command, "N", "--slave", way.slave, "Its address on the line; default: 9, of a servo 6");
+  with_value(command, "N", "--slave", way.slave, "Its address on a serial line; default: 9, of a servo 6");
   with_value(command, "COUNT", "--closed", way.closed_count, "Position that it reports when its pads touch; default: 230, of a servo 2048");
   with_value(command, "COUNT", "--open", way.open_count, "Position that it reports when it is open; default: 3, of a servo 2700");
   with_value(command, "MM", "--jaw", way.jaw_mm, "Of a servo: from its axis to the middle of the pad; default: 100 mm");

@@ -43,7 +43,8 @@ function sensorBench(options = {}) {
     return (a << 16) | (b << 8) | c;
   };
   const wait = (ms) => (now += ms * 1e6);
-  return { sensor, bus, report, write, read, adc, wait, now: () => now };
+  const command = (byte, ms) => (write(0x76, byte), wait(ms));
+  return { sensor, bus, report, write, read, adc, wait, command, now: () => now };
 }
 
 test('compensation matches the worked example of the MS5837-02BA datasheet, page 7', () => {
@@ -111,11 +112,9 @@ test('sensor: silent for 2.8 ms after reset, PROM in order, eighth word refused'
 
 test('sensor: a finished conversion gives its code once', () => {
   const b = sensorBench();
-  b.write(0x76, 0x1e);
-  b.wait(3);
+  b.command(0x1e, 3);
   assert.equal(b.adc(), 0, 'nothing was converted');
-  b.write(0x76, 0x48);
-  b.wait(8.61);
+  b.command(0x48, 8.61);
   const code = b.adc();
   assert.equal(code, Math.round(codesFor(b.sensor.prom, 101325, 25).d1));
   assert.equal(b.adc(), 0, 'a second read');
@@ -124,22 +123,17 @@ test('sensor: a finished conversion gives its code once', () => {
 test('sensor: the early-read trap returns 0 and spoils the conversion', () => {
   const b = sensorBench();
   b.sensor.prng = { normal: () => 0, range: () => 0.4 };
-  b.write(0x76, 0x1e);
-  b.wait(3);
+  b.command(0x1e, 3);
   const honest = Math.round(codesFor(b.sensor.prom, 101325, 25).d1);
-  b.write(0x76, 0x44);
-  b.wait(1);
+  b.command(0x44, 1);
   assert.equal(b.adc(), 0);
   b.wait(2);
   const spoiled = b.adc();
   assert.ok(Math.abs(spoiled - honest) > 1000, `${spoiled}`);
-  b.write(0x76, 0x44);
-  b.wait(1);
-  b.write(0x76, 0x44);
-  b.wait(3);
+  b.command(0x44, 1);
+  b.command(0x44, 3);
   assert.ok(Math.abs(b.adc() - honest) > 1000, 'a convert command in between spoils too');
-  b.write(0x76, 0x44);
-  b.wait(3);
+  b.command(0x44, 3);
   assert.equal(b.adc(), honest, 'the next one is sound');
 });
 
@@ -150,11 +144,9 @@ test('sensor: conversion time stays below the maximum, differs between parts, sa
   assert.ok(Math.max(...factors) - Math.min(...factors) > 0.04);
   const asked = [];
   const b = sensorBench({ stimulus: (_, t) => (asked.push(t), { pressure_Pa: 1e5, temperature_degC: 25 }) });
-  b.write(0x76, 0x1e);
-  b.wait(3);
+  b.command(0x1e, 3);
   const start = b.now();
-  b.write(0x76, 0x4a);
-  b.wait(20);
+  b.command(0x4a, 20);
   b.adc();
   assert.ok(Math.abs(asked[0] - (start + (OSR[5].max_ns * b.sensor.timeFactor) / 2)) < 1);
 });

@@ -94,6 +94,10 @@ class Walking(unittest.TestCase):
         self.steps, self.t_s, self.frame = [], 1.0, 0
         self.pressed_Pa = self.left_Pa = self.pulled = 0.0
 
+    def hold(self, pressed_Pa, seconds):
+        self.pressed_Pa = pressed_Pa
+        self.wait(seconds)
+
     def wait(self, seconds):
         end_s = self.t_s + seconds
         while self.t_s < end_s:
@@ -108,10 +112,8 @@ class Walking(unittest.TestCase):
             self.frame += 1
 
     def press(self, seconds=1.3):
-        self.pressed_Pa = self.PRESS_Pa
-        self.wait(seconds)
-        self.pressed_Pa = 0.0
-        self.wait(1.0)
+        self.hold(self.PRESS_Pa, seconds)
+        self.hold(0.0, 1.0)
 
     def go_to_pulls(self):
         self.begin(pull_g=100.0)
@@ -129,8 +131,7 @@ class Walking(unittest.TestCase):
         for _ in range(MARKS * protocol.TURNS):
             self.press()
         self.assertIn("in the middle", self.walk.advice)
-        self.pressed_Pa = self.PRESS_Pa
-        self.wait(protocol.HOLD_s + 1)
+        self.hold(self.PRESS_Pa, protocol.HOLD_s + 1)
         self.assertEqual(self.walk.advice, "lift it")
         self.pressed_Pa, self.left_Pa = 0.0, 50.0
         self.wait(protocol.REST_s + 2)
@@ -167,10 +168,8 @@ class Walking(unittest.TestCase):
         self.begin()
         self.wait(protocol.EMPTY_s + 1)
         for pressed_Pa in (5 * self.PRESS_Pa, 0.05 * 5 * self.PRESS_Pa):
-            self.pressed_Pa = pressed_Pa
-            self.wait(2)
-            self.pressed_Pa = 0.0
-            self.wait(2)
+            self.hold(pressed_Pa, 2)
+            self.hold(0.0, 2)
         self.assertIn("mark 2, turn 1", self.walk.advice)
         self.assertEqual(len(self.walk.measurement.finish().presses), 1)
 
@@ -190,12 +189,9 @@ class Walking(unittest.TestCase):
         self.go_to_pulls()
         self.assertEqual(self.walk.take_back(), [])  # the rest before is no press
         self.press(10)
-        self.pressed_Pa = self.PRESS_Pa
-        self.wait(3)
-        self.pressed_Pa = 0.8 * self.PRESS_Pa
-        self.wait(10)
-        self.pressed_Pa = 0.0
-        self.wait(2)
+        self.hold(self.PRESS_Pa, 3)
+        self.hold(0.8 * self.PRESS_Pa, 10)
+        self.hold(0.0, 2)
         self.assertEqual(self.walk.measurement.pulls, [])
         self.pressed_Pa, self.pulled = self.PRESS_Pa, 0.0
         self.wait(3)
@@ -203,12 +199,11 @@ class Walking(unittest.TestCase):
         self.wait(2)
         self.assertEqual(len(self.walk.take_back()), 2)
         self.assertEqual(self.walk.measurement.pulls, [])
-        self.pressed_Pa = self.pulled = 0.0
-        self.wait(2)
+        self.pulled = 0.0
+        self.hold(0.0, 2)
         for way in ("+x", "+y", "-x", "-y"):
             self.assertEqual(self.walk.advice, f"set the weight down in the middle, its thread slack towards {way}")
-            self.pressed_Pa = self.PRESS_Pa
-            self.wait(1)
+            self.hold(self.PRESS_Pa, 1)
             self.assertEqual(self.walk.advice, f"leave it at rest, its thread slack towards {way}")
             self.wait(2)
             self.assertEqual(self.walk.advice, f"pull: hang the other weight on the thread towards {way}")
@@ -217,8 +212,8 @@ class Walking(unittest.TestCase):
             self.assertEqual(self.walk.advice, "let it hang still")
             self.wait(1.5)
             self.assertEqual(self.walk.advice, "taken: lift it")
-            self.pressed_Pa = self.pulled = 0.0
-            self.wait(2)
+            self.pulled = 0.0
+            self.hold(0.0, 2)
         self.assertTrue(self.walk.is_done)
         measured = self.walk.measurement.finish()
         self.assertAlmostEqual(measured.hold.held_s, protocol.HOLD_s + 1, delta=0.5)

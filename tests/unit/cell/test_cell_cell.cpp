@@ -193,18 +193,19 @@ TEST(Cell, AWeightBesideTheAxisTurnsABallAndLessABox) {
 
 TEST(Cell, ABoxTurnsBeyondTheTorqueOfItsArea) {
   for (const double share : {0.9, 1.1}) {
-    constexpr double FRICTION = 0.5, MEAN_mm = 17.4,
-                     BESIDE_mm = 60.0; // from the middle of the faces: their area, 36 by 54 mm, and the weight
+    // From the middle of the faces, 36 by 54 mm: their area, and the weight.
+    constexpr double FRICTION = 0.5, MEAN_mm = 17.4, BESIDE_mm = 60.0;
     KindOfGrasp grasp = held(Shape::box, 0.01, FRICTION);
     grasp.height_mm = grasp.depth_mm = 200.0;
     grasp.com_mm = {BESIDE_mm, 0.0};
     Cell cell(grasp);
-    run(cell, grasp, width_mm(grasp, 10.0), 2.5, [&](double t_s, Inputs &now) {
+    run(cell, grasp, width_mm(grasp, 20.0), 2.5, [&](double t_s, Inputs &now) {
       const double most_N = 2.0 * FRICTION * cell.mean_N() / std::hypot(1.0, BESIDE_mm / MEAN_mm);
       now.table = false;
       now.mass_kg = std::max(now.mass_kg, share * most_N / GRAVITY_m_s2 * std::min(1.0, t_s / 2.0));
     });
     EXPECT_EQ(std::abs(cell.turned_rad()) > 0.4, share > 1.0) << share << ": " << cell.turned_rad();
+    EXPECT_GT(cell.mean_N(), 15.0); // still held, and not thrown out
   }
 }
 

@@ -21,6 +21,11 @@ static void next_frame(uint64_t later_us) {
   plausibility_follow(&plausibility, &frame, &conditioned);
 }
 
+static void expect_next(uint64_t later_us, uint32_t apart) {
+  next_frame(later_us);
+  TEST_ASSERT_EQUAL_HEX32(apart, plausibility.apart);
+}
+
 void setUp(void) {
   plausibility = (struct plausibility){.apart_Pa = 1000};
   memset(&conditioned, 0, sizeof conditioned);
@@ -31,14 +36,11 @@ void setUp(void) {
 
 TEST(test_one_apart_is_known_from_the_first_frame_on) {
   frame.pressure_Pa_q10[ODD] += 1200 * 1024;
-  next_frame(0);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
+  expect_next(0, 1u << ODD);
   frame.pressure_Pa_q10[ODD] -= 2400 * 1024;
-  next_frame(2000000);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
+  expect_next(2000000, 1u << ODD);
   read_all(25000); /* no air has that */
-  next_frame(2000000);
-  TEST_ASSERT_EQUAL_HEX32(ALL, plausibility.apart);
+  expect_next(2000000, ALL);
 }
 
 TEST(test_moulded_sensors_that_differ_by_kilopascals_are_not_apart) {
@@ -46,11 +48,9 @@ TEST(test_moulded_sensors_that_differ_by_kilopascals_are_not_apart) {
     frame.pressure_Pa_q10[k] += 1500 * (k % 4) * 1024;
   }
   frame.pressure_Pa_q10[ODD] += 10700 * 1024;
-  next_frame(0);
-  TEST_ASSERT_EQUAL_HEX32(0, plausibility.apart);
+  expect_next(0, 0);
   frame.pressure_Pa_q10[ODD] += 10000 * 1024;
-  next_frame(2000000);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
+  expect_next(2000000, 1u << ODD);
 }
 
 TEST(test_a_press_changes_nothing) {
@@ -61,8 +61,7 @@ TEST(test_a_press_changes_nothing) {
   frame.pressure_Pa_q10[1] += 30000 * 1024;
   frame.saturated = 1;
   conditioned.usable = ALL & ~1;
-  next_frame(3000000);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
+  expect_next(3000000, 1u << ODD);
 }
 
 TEST(test_a_sensor_beyond_its_range_that_no_other_feels_is_no_press) {
@@ -70,24 +69,19 @@ TEST(test_a_sensor_beyond_its_range_that_no_other_feels_is_no_press) {
   conditioned.usable = ALL & ~1;
   frame.saturated = 1;
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
-  next_frame(0);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
+  expect_next(0, 1u << ODD);
 }
 
 TEST(test_comparisons_are_rare_unless_others_are_used) {
-  next_frame(0);
-  TEST_ASSERT_EQUAL_HEX32(0, plausibility.apart);
+  expect_next(0, 0);
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
-  next_frame(1000);
-  TEST_ASSERT_EQUAL_HEX32(0, plausibility.apart);
+  expect_next(1000, 0);
   conditioned.usable = ALL & ~1;
-  next_frame(1000);
-  TEST_ASSERT_EQUAL_HEX32(1u << ODD, plausibility.apart);
+  expect_next(1000, 1u << ODD);
 }
 
 TEST(test_few_sensors_cannot_tell) {
   conditioned.usable = 7 << ODD;
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
-  next_frame(0);
-  TEST_ASSERT_EQUAL_HEX32(0, plausibility.apart);
+  expect_next(0, 0);
 }

@@ -34,9 +34,9 @@ public:
   }
 
   std::string port;
-  std::map<std::string, int> values{{"STA", 3}, {"GTO", 0}, {"OBJ", 0}, {"POS", 3}, {"FLT", 0}, {"ACT", 1}};
+  std::map<std::string, int> values{{"STA", 3}, {"GTO", 0}, {"OBJ", 0}, {"POS", 3}, {"PRE", 3}, {"FLT", 0}, {"ACT", 1}};
   std::string last;                           // SET
-  std::map<std::string, std::string> instead; // of the answer to this line; "-": none, and the connection ends
+  std::map<std::string, std::string> instead; // of the answer to this line; "-": none, and the connection ends; |: two pieces
   std::atomic<int> connections = 0;
 
 private:
@@ -45,12 +45,19 @@ private:
       const Descriptor line(fd);
       connections++;
       char bytes[256];
+      std::string late;
       for (ssize_t count; (count = recv(fd, bytes, sizeof bytes, 0)) > 0;) {
-        const std::string answer = answer_to(std::string(bytes, static_cast<std::size_t>(count) - 1));
+        const std::string answer = answer_to(std::string(bytes, static_cast<std::size_t>(count) - 1)), first = late + answer;
+        late = answer.empty() ? "POS 9\n" : "";
         if (answer == "-") {
           break;
         }
-        send(fd, answer.data(), answer.size(), MSG_NOSIGNAL);
+        const std::size_t piece = first.find('|');
+        send(fd, first.data(), std::min(piece, first.size()), MSG_NOSIGNAL);
+        if (piece != std::string::npos) {
+          std::this_thread::sleep_for(std::chrono::milliseconds(10));
+          send(fd, first.data() + piece + 1, first.size() - piece - 1, MSG_NOSIGNAL);
+        }
       }
     }
   }
@@ -61,17 +68,21 @@ private:
     std::istringstream words(line);
     std::string verb, name;
     words >> verb >> name;
-    if (verb == "GET") {
+    if (verb == "GET") { // the gripper follows the controller later
+      values["STA"] = name != "STA" || values["ACT"] == 1 || late_-- > 0 ? values["STA"] : 0;
+      values["PRE"] = values["POS"] = name != "PRE" || late_-- > 0 ? values["PRE"] : request_;
       return name + " " + std::to_string(values.at(name)) + "\n";
     }
+    late_ = line == last ? late_ : 2;
     last = line;
     for (int value; words >> value; words >> name) {
-      values[name] = value;
+      (name == "POS" ? request_ : values[name]) = value;
     }
-    values["STA"] = values["ACT"] == 1 ? 3 : 0;
+    values["STA"] = line != "SET ACT 1" ? values["STA"] : values["STA"] == 0 ? 3 : 1; // 1: it has seen no reset
     return "ack";
   }
 
+  int request_ = 3, late_ = 0;
   Descriptor listener_{socket(AF_INET, SOCK_STREAM, 0)};
   std::thread thread_;
 };
@@ -80,30 +91,37 @@ private:
 
 TEST(Urcap, MovesAndReports) {
   Server server;
+  server.values["GTO"] = 1;
   const auto gripper = open_gripper({.model = "2f85", .port = server.port, .timeout_s = 5.0});
-  EXPECT_TRUE(gripper->poll().active);
   gripper->activate();
   EXPECT_EQ(server.last, "SET ACT 1");
-  GripperStatus status = gripper->move({.width_mm = 42.5, .speed_mm_s = 150, .force_N = 20});
-  EXPECT_EQ(server.last, "SET POS 117 SPE 255 FOR 0 GTO 1");
-  EXPECT_TRUE(status.moving);
-  EXPECT_NEAR(status.width_mm, 42.5, 0.2);
+  EXPECT_EQ(server.values["GTO"], 0);
   server.values["OBJ"] = 2;
   server.values["FLT"] = 8;
+  server.instead = {{"GET GTO", "GT|O 1\n"}};
+  GripperStatus status = gripper->move({.width_mm = 42.5, .speed_mm_s = 150, .force_N = 20});
+  EXPECT_EQ(server.last, "SET POS 117 SPE 255 FOR 0 GTO 1");
+  EXPECT_TRUE(status.active && status.moving); // whatever OBJ says of the move before
+  gripper->poll();
   status = gripper->poll();
+  EXPECT_NEAR(status.width_mm, 42.5, 0.2);
   EXPECT_FALSE(status.moving);
   EXPECT_EQ(status.object, true);
   EXPECT_EQ(gripper->fault_text(status.fault), "too hot, it must cool down");
-  server.values["STA"] = 0;
+  server.instead = {{"GET STA", "STA 0\n"}};
   EXPECT_FALSE(gripper->poll().active);
+  server.last = "";
+  EXPECT_FALSE(gripper->move({.width_mm = 0, .speed_mm_s = 150, .force_N = 20}).active);
+  EXPECT_EQ(server.last, "");
 }
 
 TEST(Urcap, WhatIsNoAnswerIsAnErrorAndTheNextIsAskedAnew) {
   Server server;
-  const auto gripper = open_gripper({.model = "hande", .port = server.port, .timeout_s = 5.0});
-  for (const auto &[answer, code] : {std::pair("POS x", ErrorCode::gripper_garbled),
+  const auto gripper = open_gripper({.model = "hande", .port = server.port, .timeout_s = 1.0});
+  for (const auto &[answer, code] : {std::pair("POS x\n", ErrorCode::gripper_garbled),
                                      {"OBJ 3", ErrorCode::gripper_garbled},
                                      {"POS 999", ErrorCode::gripper_garbled},
+                                     {"", ErrorCode::gripper_silent},
                                      {"-", ErrorCode::gripper_silent}}) {
     const int before = server.connections;
     server.instead = {{"GET POS", answer}};
@@ -112,8 +130,11 @@ TEST(Urcap, WhatIsNoAnswerIsAnErrorAndTheNextIsAskedAnew) {
     EXPECT_EQ(gripper->poll().width_mm, 50.0);
     EXPECT_EQ(server.connections, before + 1) << answer;
   }
-  server.instead = {{"SET ACT 0", "nak"}};
+  const int before = server.connections;
+  server.instead = {{"SET ACT 0 GTO 0 ATR 0", "nak\n"}};
   EXPECT_EQ(code_of([&] { gripper->activate(); }), ErrorCode::gripper_refused);
+  gripper->poll();
+  EXPECT_EQ(server.connections, before + 1);
 }
 
 TEST(Urcap, WhatCannotBeOpened) {
@@ -125,5 +146,6 @@ TEST(Urcap, WhatCannotBeOpened) {
     EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = port, .timeout_s = 0.005}); }), ErrorCode::gripper_silent);
     EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = port, .slave = 9}); }), ErrorCode::bad_value);
   }
-  EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = port}); }), ErrorCode::cannot_open);
+  EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = port}); }), ErrorCode::gripper_silent);
+  EXPECT_EQ(code_of([&] { open_gripper({.model = "2f85", .port = "ur:127.0.0.1:none"}); }), ErrorCode::no_port);
 }

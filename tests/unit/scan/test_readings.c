@@ -82,6 +82,11 @@ static void take_and_expect(uint32_t good, uint32_t valid, uint32_t left_out) {
   expect(valid, left_out);
 }
 
+static void expect_after_temperature(uint32_t valid) {
+  take_temperature();
+  take_and_expect(ALL, valid, 0);
+}
+
 TEST(test_a_step_of_one_sensor_alone_is_left_out_of_its_frame) {
   static const double steps_Pa[] = {9e3, -9e3, 60e3, -60e3, 150e3};
   for (int i = 0; i < 5 * SENSORS; i++) {
@@ -133,14 +138,12 @@ TEST(test_a_step_that_another_measures_counts_at_once) {
     take_pressures(ALL);
     TEST_ASSERT_EQUAL_HEX32(fast ? ONE_BIT : 0, frame.doubtful & frame.unsettled);
   }
-  take_temperature();
-  take_and_expect(ALL, ALL, 0);
+  expect_after_temperature(ALL);
   step_by(ONE, -6.4e3);
   step_by(ONE + 1, -300);
   take_pressures(ALL); /* as if it had lost its state: its temperature has not */
   TEST_ASSERT_EQUAL_HEX32(ONE_BIT, frame.doubtful & frame.unsettled);
-  take_temperature();
-  take_and_expect(ALL, ALL, 0);
+  expect_after_temperature(ALL);
   TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
 }
 
@@ -158,8 +161,7 @@ TEST(test_where_presses_are_not_shared_or_a_sensor_is_missing_every_step_counts)
 TEST(test_a_step_after_an_admission_between_frames_is_left_out) {
   start();
   temperature.returned = ONE_BIT;
-  take_temperature();
-  take_and_expect(ALL, ALL, 0);
+  expect_after_temperature(ALL);
   step_by(ONE, -17000);
   take_and_expect(ALL, ALL & ~ONE_BIT, 1);
 }
@@ -342,15 +344,13 @@ TEST(test_a_first_temperature_far_from_the_others_is_believed_after_two_resets) 
   TEST_ASSERT_EQUAL_HEX32(0, frame.unsettled);
   warm_by(ONE, -12);
   temperature.returned = ONE_BIT;
-  take_temperature();
-  take_and_expect(ALL, ALL, 0);
+  expect_after_temperature(ALL);
   TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
 }
 
 static void look_again(double warmer_degC, uint32_t doubtful) {
   warm_by(ONE, warmer_degC);
-  take_temperature();
-  take_and_expect(ALL, ALL, 0);
+  expect_after_temperature(ALL);
   TEST_ASSERT_EQUAL_HEX32(doubtful, frame.doubtful);
 }
 
@@ -374,8 +374,7 @@ TEST(test_a_temperature_apart_from_the_start_is_doubtful) {
 TEST(test_a_temperature_at_which_no_sensor_works_is_never_used) {
   warm_by(ONE, 90);
   for (int i = 0; i < 10; i++) {
-    take_temperature();
-    take_and_expect(ALL, ALL & ~ONE_BIT, 0);
+    expect_after_temperature(ALL & ~ONE_BIT);
     temperature.returned = readings.suspects;
   }
 }
@@ -404,18 +403,15 @@ TEST(test_a_sensor_with_a_bad_prom_must_read_like_the_others) {
     temperature.prom_bad = ONE_BIT;
     step_by(ONE, cases[i].apart_Pa);
     for (int n = 0; n < 2; n++) {
-      take_temperature();
-      take_and_expect(ALL, ALL & ~ONE_BIT, 0);
+      expect_after_temperature(ALL & ~ONE_BIT);
     }
-    take_temperature();
-    take_and_expect(ALL, cases[i].used ? ALL : ALL & ~ONE_BIT, 0);
+    expect_after_temperature(cases[i].used ? ALL : ALL & ~ONE_BIT);
     TEST_ASSERT_EQUAL_HEX32(cases[i].used ? ONE_BIT : 0, frame.doubtful);
     TEST_ASSERT_EQUAL_HEX32(0, frame.unsettled);
     /* Once it did, presses do not matter. */
     for (int k = 0; k < SENSORS; k++) {
       step_by(k, k == ONE ? 40e3 : 8e3);
     }
-    take_temperature();
-    take_and_expect(ALL, cases[i].used ? ALL : ALL & ~ONE_BIT, 0);
+    expect_after_temperature(cases[i].used ? ALL : ALL & ~ONE_BIT);
   }
 }
