@@ -169,10 +169,10 @@ struct Cell::World {
     return pad.kind.at_1_mm_N * std::pow(std::max(x, 0.0), grasp.exponent);
   }
 
-  void press(Pad &pad, double finger_mm, double finger_mm_s) {
+  void press(Pad &pad, double finger_mm, double finger_mm_s, bool jumps) {
     double &at_m = data->qpos[model->jnt_qposadr[model->dof_jntid[pad.dof]]];
     double &speed_m_s = data->qvel[pad.dof];
-    if (std::abs(finger_mm - at_m / M) > JUMPS_mm) {
+    if (std::abs(finger_mm - at_m / M) > JUMPS_mm || (jumps && finger_mm < at_m / M)) { // the object may be beside the middle
       at_m = M * finger_mm;
       speed_m_s = 0.0;
     }
@@ -287,7 +287,7 @@ struct Cell::World {
     }
     mju_zero(data->qfrc_applied, MOTIONS);
     for (Pad &pad : pads) {
-      press(pad, finger_mm, finger_mm_s);
+      press(pad, finger_mm, finger_mm_s, jumps);
       rub(pad, inputs.friction_share);
     }
     const double heavier = inputs.mass_kg / model->body_mass[object];
