@@ -88,7 +88,7 @@ export class Fingertip {
   /** How its firmware last ended; null until asked for (askCrash). */
   crash: Crash | null = null;
   readonly clock = new core.ClockFit();
-  /** null: none is under way. */
+  /** null: no calibration is under way. */
   found: Found | null = null;
   /** null until its info came. */
   history: History | null = null;
@@ -140,10 +140,15 @@ export class Fingertip {
     return this.counts.dropped_packets;
   }
 
-  /** Called after state, info, health or crash changed. Returns what ends it. */
+  /** Called after state, info, health, crash or what a calibration found changed. Returns what ends it. */
   listen(listener: () => void): () => void {
     this.listeners.add(listener);
     return () => this.listeners.delete(listener);
+  }
+
+  setFound(found: Found | null): void {
+    this.found = found;
+    this.changed();
   }
 
   tap(tap: PacketTap): () => void {
@@ -442,8 +447,6 @@ export class Fingertip {
   }
 
   private changed(): void {
-    for (const listener of this.listeners) {
-      listener();
-    }
+    this.listeners.forEach((listener) => listener());
   }
 }

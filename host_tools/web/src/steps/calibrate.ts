@@ -120,10 +120,13 @@ export function calibrate(fingertip: Fingertip): void {
         : 'It is not calibrated.',
     form(() => undefined, field('Weight, g', weight, 'empty: unknown, gains alone')),
   );
-  const begin = (work: (judges: Judges, force_N: number | null) => Promise<void>) => async () => {
+  const begin = (work: (judges: Judges, info: Uint8Array, force_N: number | null) => Promise<void>) => async () => {
     const force_N = forceOf(weight.value);
     await checkSensors(fingertip);
-    await work(await loadJudges(), force_N);
+    const [judges, info] = [await loadJudges(), await fingertip.askInfo()];
+    if (!dialog.is_closed) {
+      await work(judges, frameOf(info), force_N);
+    }
   };
   const erase = async (): Promise<void> => {
     await fingertip.command({ type: PacketType.CMD_ERASE_CALIBRATION });
@@ -133,14 +136,14 @@ export function calibrate(fingertip: Fingertip): void {
   dialog.choose([
     dialog.doing(
       'Begin',
-      begin((judges, force_N) => gains(dialog, fingertip, judges, force_N)),
+      begin((judges, info, force_N) => gains(dialog, fingertip, judges.gains(info), force_N)),
       MAIN,
     ),
     ...(knows_pad
       ? [
           dialog.doing(
             'Tangential force',
-            begin((judges, force_N) => pulls(dialog, fingertip, judges, force_N)),
+            begin((judges, info, force_N) => pulls(dialog, fingertip, judges, info, force_N)),
           ),
         ]
       : []),
@@ -148,12 +151,11 @@ export function calibrate(fingertip: Fingertip): void {
   ]);
 }
 
-async function gains(dialog: Dialog, fingertip: Fingertip, judges: Judges, force_N: number | null): Promise<void> {
-  const session = judges.gains(frameOf(await fingertip.askInfo()));
+async function gains(dialog: Dialog, fingertip: Fingertip, session: GainSession, force_N: number | null): Promise<void> {
   const progress = paragraph();
   const text = paragraph();
   dialog.show(progress, text);
-  dialog.onClose = () => (fingertip.found = null);
+  dialog.onClose = () => fingertip.setFound(null);
   dialog.beside();
   const undo = dialog.doing('Take back the last', async () => session.takeBack());
   dialog.choose([undo]);
@@ -167,7 +169,7 @@ async function gains(dialog: Dialog, fingertip: Fingertip, judges: Judges, force
       progress.textContent = status.progress;
       text.textContent = status.text;
       undo.disabled = status.placements.length === 0;
-      fingertip.found = status;
+      fingertip.setFound(status);
     },
     () => confirmGains(dialog, fingertip, session, force_N),
   );
@@ -176,7 +178,7 @@ async function gains(dialog: Dialog, fingertip: Fingertip, judges: Judges, force
 function confirmGains(dialog: Dialog, fingertip: Fingertip, session: GainSession, force_N: number | null): void {
   const date_s = Math.floor(Date.now() / 1000);
   const { calibration, before, after } = session.result(force_N, date_s);
-  fingertip.found = { ...session.status(), wanted: null };
+  fingertip.setFound({ ...session.status(), wanted: null });
   dialog.show(
     `${session.status().text}, from ${calibration.calibration_placements} placements`,
     table(
@@ -232,11 +234,11 @@ function sensorTable({ gain, gain_sd, off_x_um, off_y_um, wider_q15 }: Calibrati
   );
 }
 
-async function pulls(dialog: Dialog, fingertip: Fingertip, judges: Judges, force_N: number | null): Promise<void> {
+async function pulls(dialog: Dialog, fingertip: Fingertip, judges: Judges, info: Uint8Array, force_N: number | null): Promise<void> {
   if (force_N === null) {
     throw new Error('give the weight that hangs on the string');
   }
-  const session = judges.pulls(frameOf(await fingertip.askInfo()), force_N);
+  const session = judges.pulls(info, force_N);
   const last = paragraph();
   const text = paragraph();
   dialog.show(

@@ -64,11 +64,12 @@ export class Dialog {
     this.choose([this.doing('Store', stored, MAIN)]);
   }
 
-  /** From now on the page can be used meanwhile. */
+  /** From now on the page can be used meanwhile, its pad above all. */
   beside(): void {
     this.element.close();
     this.element.classList.add('beside');
     this.element.show();
+    document.querySelector('.pad-card.selected')?.scrollIntoView({ block: 'nearest' });
   }
 
   setMessage(text: string): void {

@@ -73,19 +73,20 @@ export function fingertipControls(app: App, fingertip: Fingertip): HTMLElement {
     leave_button,
   );
   const show = (): void => {
-    const { info, state, is_replay } = fingertip;
+    const { info, state, is_replay, found } = fingertip;
     const live = (state === 'live' || state === 'silent') && !is_replay && info !== null;
     const recording = app.recorders.has(fingertip);
     const replay = app.replays.get(fingertip);
     controls.setAttribute('aria-label', `Fingertip ${fingertip.name}`);
     for (const button of [tare_button, set_button, calibrate_button, doctor_button]) {
-      button.disabled = !live;
+      button.disabled = !live || (found !== null && button !== doctor_button);
       button.hidden = is_replay;
     }
-    calibrate_button.disabled = !live || !(info.capabilities & Capability.FIT);
+    calibrate_button.disabled ||= !live || !(info.capabilities & Capability.FIT);
     record_button.hidden = recording || is_replay;
     record_button.disabled = !live;
     stop_button.hidden = !recording;
+    flash_button.disabled = found !== null;
     flash_button.hidden = is_replay || app.portOf(fingertip) === null;
     for (const control of [pause_button, speed, skip_button]) {
       control.hidden = !replay;

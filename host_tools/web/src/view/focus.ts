@@ -20,10 +20,10 @@ function nearest(around: readonly HTMLElement[]): HTMLElement | undefined {
   return undefined;
 }
 
-/** The elements around a control, from near to far; around a dialog are those that it was opened from. */
+/** A control and the elements around it, from near to far; around a dialog are those that it was opened from. */
 function placesAround(control: HTMLElement, before: readonly HTMLElement[]): HTMLElement[] {
   const places: HTMLElement[] = [];
-  for (let place = control.parentElement; place; place = place.parentElement) {
+  for (let place: HTMLElement | null = control; place; place = place.parentElement) {
     places.push(place);
     if (place instanceof HTMLDialogElement) {
       return [...places, ...before.filter((each) => !place.contains(each))];
@@ -39,7 +39,7 @@ export function keepFocus(): void {
   document.addEventListener('focusin', ({ target }) => {
     if (target instanceof HTMLElement) {
       resting = false;
-      around = [target, ...placesAround(target, around)];
+      around = placesAround(target, around);
     }
   });
   const look = (): void => {

@@ -63,7 +63,7 @@ export class PadCard {
       return false;
     }
     const current = behind_s !== null || shown.isCurrent(performance.now());
-    const seen = `${history.end} ${behind_s} ${current} ${truth?.contact} ${truth?.x_mm} ${truth?.y_mm}`;
+    const seen = `${history.end} ${behind_s} ${current} ${truth?.contact} ${truth?.x_mm} ${truth?.y_mm} ${!shown.fingertip.found}`;
     if (seen !== this.seen && shown.layout && this.view) {
       this.seen = seen;
       const live = behind_s === null;

@@ -25,7 +25,7 @@ const TITLE_px = 20;
 const TIMES_px = 22;
 /** The least height at which a plot can be read. */
 const LEAST_PLOT_px = 44;
-/** Of a step of the wheel. */
+/** Of one event of the wheel at most; that of a pinch on a touchpad is less. */
 const ZOOM = 1.25;
 /** From one tick to the next. */
 const TICK_px = 24;
@@ -57,7 +57,7 @@ interface Drawn {
 }
 
 export class Traces {
-  readonly element = element('div', { class: 'traces' });
+  readonly element = element('div', { class: 'traces', title: 'Ctrl with the wheel, + and −, or drawing over a part zoom in time' });
   private readonly buckets = new Buckets(2 * MOST_INTERVALS);
   private readonly strip = element('canvas', { class: 'flags', role: 'img' });
   private drawn: Drawn[] = [];
@@ -73,7 +73,7 @@ export class Traces {
   onResize: (() => void) | null = null;
   /** A part of it was drawn over. */
   onSelect: ((span: Span) => void) | null = null;
-  /** Wheel: show so many times the time. */
+  /** Wheel with Ctrl or ⌘, a pinch too: show so many times the time. */
   onZoom: ((times: number) => void) | null = null;
 
   constructor() {
@@ -87,8 +87,10 @@ export class Traces {
       }
     }).observe(this.element);
     const wheel = (event: WheelEvent) => {
-      event.preventDefault();
-      this.onZoom?.(ZOOM ** Math.sign(event.deltaY));
+      if ((event.ctrlKey || event.metaKey) && event.deltaY !== 0) {
+        event.preventDefault();
+        this.onZoom?.(Math.min(Math.max(Math.exp(event.deltaY / 100), 1 / ZOOM), ZOOM));
+      }
     };
     this.element.addEventListener('wheel', wheel, { passive: false });
   }
@@ -98,7 +100,6 @@ export class Traces {
     this.build();
   }
 
-  /** zero_s: the time that the axis calls 0, as "now" or the end of the recording. */
   draw(fingertip: Shown, history: History, span: Span): void {
     if (fingertip.tangential !== this.tangential || fingertip.finger !== this.finger) {
       this.tangential = fingertip.tangential;
@@ -168,17 +169,8 @@ export class Traces {
       }
       const box = element('div', { class: 'trace' }, title);
       this.element.append(box);
-      const drawn: Drawn = {
-        plot,
-        low: 0,
-        high: 1,
-        threshold: null,
-        chart: new uPlot(
-          this.options(plot, palette, () => drawn),
-          [[]],
-          box,
-        ),
-      };
+      const options = this.options(plot, palette, () => drawn);
+      const drawn: Drawn = { plot, low: 0, high: 1, threshold: null, chart: new uPlot(options, [[]], box) };
       this.drawn.push(drawn);
     }
     this.element.append(this.strip);
@@ -206,7 +198,7 @@ export class Traces {
       padding: [6, RIGHT_px, last ? 0 : 4, 0],
       cursor: {
         sync: { key: 'fingertip' },
-        drag: { x: true, y: false, setScale: false },
+        drag: { x: true, y: false, dist: 5, setScale: false },
         bind: { dblclick: () => null },
         points: { show: false },
         y: false,
