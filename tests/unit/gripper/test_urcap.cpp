@@ -14,7 +14,7 @@ using test::code_of;
 
 namespace {
 
-// The socket of a URCap: its variables, and what it answers instead.
+// real time: a socket of this machine. The variables of a URCap, and what it answers instead.
 class Server {
 public:
   Server() {
