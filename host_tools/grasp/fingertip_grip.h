@@ -32,7 +32,7 @@ extern "C" {
 #endif
 
 /* The phases of a grasp follow Romano et al., "Human-inspired robotic grasp control with tactile
- * sensing", IEEE Trans. Robotics 27, 2011. */
+ * sensing", IEEE Trans. Robotics 27, 2011. From SQUEEZE to HANDING an object is held. */
 enum fingertip_grip_state {
   GRIP_IDLE, /* no request yet */
   GRIP_ACTIVATING,

@@ -1,7 +1,19 @@
-// A grasp from its first step to its last: frames of two fingertips and a gripper's answers go into the controller's core, and commands
-// come out of it. In turn: meet, begin, request, take as long as it goes on, end. Threads: one for each fingertip (DeviceLoop), one for the
-// gripper (GripperThread), and one that steps the core at each frame and answer, and every 5 ms without any. None waits for the reader of
-// the news. News that are not read for long are dropped and counted. All times are of the host's steady clock. The core has no other clock.
+// A grasp from its first step to its last: frames of two fingertips and a gripper's answers go into
+// the controller's core, and commands come out of it.
+//
+//   GraspLoop loop({left, right}, {});
+//   auto met = loop.meet([] { return stop_requested(); });      who they are
+//   loop.begin(open_gripper(way), [&] { return open_gripper(way); }, settings);
+//   loop.request(GRIP_REQUEST_GRASP);
+//   while (!over) {
+//     for (GraspNews &news : loop.take(20ms)) ...
+//   }
+//   loop.end();                                                 the width stays
+//
+// Threads: one for each fingertip (DeviceLoop), one for the gripper (GripperThread), and one that steps the core at
+// each frame and answer, and every 5 ms without any. None waits for the reader of the news. News that are not read for
+// long are dropped and counted. All times are of the host's steady clock. The core has no other clock.
+//
 // A failure is a trouble in the report and never opens the gripper. The loop waits for a fingertip or a gripper that is gone, and goes on
 // when it is back. If this process dies, the gripper goes to the last commanded width, some tenths of a millimetre away, and stays.
 #pragma once

@@ -22,12 +22,13 @@ struct Column {
 };
 
 // field(row): a reference to it.
-template <typename Field> Column number(const char *name, Field field, bool is_of_status = false) {
-  return {name, is_of_status, [=](const GripRow &row) { return fixed(field(row), 3); },
+// Not a number: unknown, where it may be; its cell is empty.
+template <typename Field> Column number(const char *name, Field field, bool is_of_status = false, bool may_be_unknown = false) {
+  return {name, is_of_status, [=](const GripRow &row) { return std::isnan(field(row)) ? "" : fixed(field(row), 3); },
           [=](std::string_view cell, GripRow &row) {
             const auto read = to_double(cell);
-            field(row) = read.value_or(0.0);
-            return read && std::isfinite(*read);
+            field(row) = read.value_or(cell.empty() ? std::nan("") : 0.0);
+            return cell.empty() ? may_be_unknown : read && std::isfinite(*read);
           }};
 }
 
@@ -77,7 +78,7 @@ const std::vector<Column> &columns() {
       flag("object", FIELD(status->object)),
       flag("active", FIELD(status->active)),
       integer("fault", FIELD(status->fault), true),
-      number("current_A", FIELD(status->current_A), true),
+      number("current_A", FIELD(status->current_A), true, true),
       integer("status_us", FIELD(status->host_us), true),
       integer("motion", FIELD(command.motion)),
       number("command_mm", FIELD(command.width_mm)),

@@ -54,7 +54,7 @@ class ThirdBoard(unittest.TestCase):
         toolchain = cls.tree / "cmake/toolchain-arm-none-eabi.cmake"
         settings = (
             "-DCMAKE_BUILD_TYPE=Release",
-            "-DCMAKE_C_FLAGS_RELEASE=-Os",  # nobody debugs it
+            "-DCMAKE_C_FLAGS_RELEASE=-Os",  # not debugged
             f"-DCMAKE_TOOLCHAIN_FILE={toolchain}",
             f"-DFINGERTIP_BOARD={THIRD}",
             "-DFINGERTIP_PICO_W=ON",

@@ -5,7 +5,7 @@ import signal
 
 
 def disk_of(most_bytes):
-    """preexec_fn of a program each of whose files may have so many bytes."""
+    """preexec_fn of a program each of whose files is limited to this size."""
 
     def limit():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

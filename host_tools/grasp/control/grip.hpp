@@ -1,8 +1,11 @@
-// The controller of a grasp: frames of two fingertips and a gripper's status in, one command out, called as fingertip_grip.h shows. Two
-// modes. `fixed` holds a set force: De Clercq et al., RA-L 2022, eq. (5) and (6). `hold` holds an object of unknown weight by its load:
+// The controller of a grasp: frames of two fingertips and a gripper's status in, one command out, called as fingertip_grip.h shows.
+//
+// Two modes. `fixed` holds a set force: De Clercq et al., RA-L 2022, eq. (5) and (6). `hold` holds an object of unknown weight by its load:
 // grip force = margin x tangential force / friction. The grip rises at once where the object slides, and falls slowly while it rests.
-// CONTROL.md has the reasons. No clock, no allocation, deterministic. Times are the caller's, in s, on one clock for all inputs. Forces are
-// N, lengths mm, of one fingertip: its normal force is the grip force.
+// CONTROL.md has the reasons.
+//
+// No clock, no allocation, deterministic. Times are the caller's, in s, on one clock for all inputs. Forces are N, lengths mm, of one
+// fingertip: its normal force is the grip force.
 #pragma once
 
 #include "grasp/control/finger.hpp"

@@ -21,11 +21,13 @@ struct GripperUsual {
 };
 GripperWay complete(GripperWay way, const GripperUsual &usual);
 
-// Questions to a gripper and its answers, in the maker's protocol. An adapter that hears itself is recognised: the question comes back
-// before the answer. Answers have no number: a late one would pass for that to the next question. But they come in the order of the
-// questions. So after a question without an answer another is asked, once, whose answer no other has, and what comes before that is not
-// expected. It waits SURE_TIMEOUTS times as long as any other; where its answer is lost the question with the other number is asked, lest
-// the first come after all. An answer that is late by less than that is never taken for another's.
+// Questions to a gripper and its answers, in the maker's protocol. An adapter that hears itself is
+// recognised: the question comes back before the answer.
+//
+// Answers have no number: a late one would pass for that to the next question. But they come in the order of the questions. So after a
+// question without an answer another is asked, once, whose answer no other has, and what comes before that is not expected. It waits
+// SURE_TIMEOUTS times as long as any other; where its answer is lost the question with the other number is asked, lest the first come after
+// all. An answer that is late by less than that is never taken for another's.
 class AskedLine : public Gripper {
 public:
   using Bytes = std::vector<std::uint8_t>;

@@ -1,8 +1,11 @@
-// A gripper of one Feetech STS3215 that turns one jaw against a fixed one, as an SO-101's. The width between the pads is that of a chord: 2
-// jaw sin(angle / 2). The angle counts from where the pads touch. Counts of the ends and the jaw's length are options (GripperWay). The
-// defaults are a jaw of 100 mm that touches at 2048 and opens by a radian, 652 counts, to 96 mm. The pads are parallel only where they
-// touch. Its force limit is a share of the stall torque, 1.9 Nm at 7.4 V by the maker's figures, over the jaw. This is only a guess of the
-// force in newtons: friction in the gears is at least as large.
+// A gripper of one Feetech STS3215 that turns one jaw against a fixed one, as an SO-101's.
+//
+// The width between the pads is that of a chord: 2 jaw sin(angle / 2). The angle counts from where the pads touch.
+// Counts of the ends and the jaw's length are options (GripperWay). The defaults are a jaw of 100 mm that touches at
+// 2048 and opens by a radian, 652 counts, to 96 mm. The pads are parallel only where they touch.
+//
+// Its force limit is a share of the stall torque, 1.9 Nm at 7.4 V by the maker's figures, over the
+// jaw. This is only a guess of the force in newtons: friction in the gears is at least as large.
 //
 // Sources of the servo's memory and packets: Feetech, "STS Magnetic Encoding Smart Servo Protocol Manual", and "SMS/STS memory table".
 // Half-duplex serial. A packet is FF FF, id, length (of the rest), instruction or error bits, parameters, checksum (~ of the sum from id

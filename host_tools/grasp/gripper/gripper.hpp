@@ -41,7 +41,7 @@ struct GripperStatus {
   bool moving = false;        // or activating
   std::optional<bool> object; // what the gripper itself believes; empty while it moves
   double width_mm = 0.0;
-  double current_A = 0.0; // of its motor, as a number without sign; 0 by a URCap, which does not have it
+  double current_A = 0.0; // of its motor, as a number without sign; NaN: unknown, as by a URCap
   std::uint8_t fault = 0; // the maker's code; 0: none
   // The gripper got no question for a second or more before this exchange. No fault: a gripper that reports this goes on.
   bool was_left_alone = false;

@@ -1,7 +1,10 @@
-// Robotiq 2F-85, 2F-140 and Hand-E by Modbus RTU. The driver finds out which functions a gripper answers. To read it tries 4, then 3, when
-// it opens. To write and read it tries 23, then 16 and a read, at the first moves, since only a command can show it. A move writes rPR, rSP
-// and rFR alone. So a gripper that lost its power since the last answer stays inactive. Writing rACT again would activate it and drop what
-// it holds. rGTO is written with them only if a status has just shown active without gGTO.
+// Robotiq 2F-85, 2F-140 and Hand-E by Modbus RTU.
+//
+// The driver finds out which functions a gripper answers. To read it tries 4, then 3, when it opens. To write and read
+// it tries 23, then 16 and a read, at the first moves, since only a command can show it.
+//
+// A move writes rPR, rSP and rFR alone. So a gripper that lost its power since the last answer stays inactive. Writing rACT again would
+// activate it and drop what it holds. rGTO is written with them only if a status has just shown active without gGTO.
 //
 // Sources: Robotiq, "2F-85 & 2F-140 Instruction Manual" and "Hand-E Gripper Instruction Manual", sections Control (register mapping) and
 // Modbus RTU communication. Functions: 16 and 23 write; 23 and 4 read, in older manuals 3 instead of 4. There are no exception answers: the

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <netdb.h>
 #include <poll.h>
@@ -144,7 +145,9 @@ GripperStatus RobotiqUrcap::poll() {
   const int gobj = get("OBJ"), gflt = get("FLT");
   const std::int64_t asked_us = steady_now_us();
   active_ = gsta == ACTIVATED;
-  return status_of({active_, goes, gsta, begins ? IN_MOTION : gobj, get("POS"), gflt}, asked_us, way_, traits_);
+  GripperStatus status = status_of({active_, goes, gsta, begins ? IN_MOTION : gobj, get("POS"), gflt}, asked_us, way_, traits_);
+  status.current_A = std::nan("");
+  return status;
 }
 
 GripperStatus RobotiqUrcap::move(const GripperMove &move) {

@@ -1,10 +1,15 @@
 // A Robotiq gripper on the wrist of a Universal Robots arm, by the socket that its URCap opens on the robot's controller: the port
-// "ur:HOST", or "ur:HOST:PORT" if it is not 63352. A line of text a question, one at a time: SET POS 100 SPE 255 FOR 0 GTO 1 is answered
-// with ack, GET POS with POS 97. The names are those of the registers (robotiq.hpp). There is no current: it is reported as 0. `ack` only
-// says that the controller has the values, so a move is under way until PRE, the gripper's own goal, is the one that was sent. An answer
-// has no number, so after one that did not come in time the connection is made anew. Sources: Robotiq, "2F-85 & 2F-140 Instruction Manual",
-// the names; public drivers of the socket (ur_rtde's robotiq_gripper.py and robotiq_2f_urcap_adapter), the lines. How long an answer takes
-// is assumed. It was tested against a server of our own and no robot.
+// "ur:HOST", or "ur:HOST:PORT" if it is not 63352. It was tested against a server of our own, and no robot.
+//
+//   SET POS 100 SPE 255 FOR 0 GTO 1    ack
+//   GET POS                            POS 97
+//
+// A line of text a question, one at a time. The names are those of the registers (robotiq.hpp); there is no current. `ack` only says that
+// the controller has the values, so a move is under way until PRE, the gripper's own goal, is the one that was sent. An answer has no
+// number, so after one that did not come in time it connects again. How long an answer takes is assumed.
+//
+// Sources: Robotiq, "2F-85 & 2F-140 Instruction Manual", the names; public drivers of the socket (ur_rtde's robotiq_gripper.py and
+// robotiq_2f_urcap_adapter), the lines.
 #pragma once
 
 #include "grasp/gripper/robotiq.hpp"

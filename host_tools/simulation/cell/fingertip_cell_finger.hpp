@@ -1,6 +1,8 @@
-// A fingertip of the cell in a process of its own: the whole firmware on simulated sensors (player/native_fingertip.h), on a port that
-// opens and hangs up as one on USB does. Its clock goes with the host's: it runs to where the world is known, so that frames come 1 to 2 ms
-// later than they would, never too early. A reading is of the newest that is known, at most half a conversion before its time.
+// A fingertip of the cell in a process of its own: the whole firmware on simulated sensors
+// (player/native_fingertip.h), on a port that opens and hangs up as one on USB does.
+//
+// Its clock goes with the host's: it runs to where the world is known, so that frames come 1 to 2 ms later than they
+// would, never too early. A reading is of the newest that is known, at most half a conversion before its time.
 #pragma once
 
 #include "simulation/cell/face.hpp"

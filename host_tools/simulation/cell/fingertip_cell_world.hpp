@@ -1,7 +1,8 @@
-// The cell's world as time passes, its truth, and what can be done to it by name. The object is on the table between the fingers. Once the
-// grip's force has been steady for a while, or by a command, the hand lifts it; then come the events of the grasp (kinds.hpp), and those
-// that are planned or commanded. What slides by less than SLIP_mm at a time has not slipped. An object that slid DROP_mm, or that nothing
-// presses any more, is gone.
+// The cell's world as time passes, its truth, and what can be done to it by name.
+//
+// The object is on the table between the fingers. Once the grip's force has been steady for a while, or by a command, the hand lifts it;
+// then come the events of the grasp (kinds.hpp), and those that are planned or commanded. What slides by less than SLIP_mm at a time has
+// not slipped. An object that slid DROP_mm, or that nothing presses any more, is gone.
 #pragma once
 
 #include "simulation/cell/cell.hpp"

@@ -1,7 +1,17 @@
-// How a simulated gripper's fingers move, in simulated time: no line, no clock, no chance. A command counts after the latency, and one that
-// came later replaces it only after its own. Fingers run at constant speed to the nearest step and stop at once; what accelerates is not
-// modelled, and nothing but backlash lets an object push them apart: a 2F-85's screw holds, a servo would yield. Latencies and the servo's
-// backlash are assumptions, no measurements.
+// How a simulated gripper's fingers move, in simulated time: no line, no clock, no chance.
+//
+//   GripperMotion motion(gripper_mechanics("ideal"));
+//   motion.blocked_at = [&](double width_mm, double force_N) { return ...; };
+//   motion.activate();
+//   motion.move({.width_mm = 20, .speed_mm_s = 50, .force_N = 20});
+//   for (...) {
+//     motion.step(0.0005);
+//     squeeze(motion.width_mm());
+//   }
+//
+// A command counts after the latency, and one that came later replaces it only after its own. Fingers run at constant speed to the nearest
+// step and stop at once; what accelerates is not modelled, and nothing but backlash lets an object push them apart: a 2F-85's screw holds,
+// a servo would yield. Latencies and the servo's backlash are assumptions, no measurements.
 #pragma once
 
 #include "grasp/gripper/gripper.hpp"

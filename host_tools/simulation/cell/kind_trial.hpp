@@ -1,7 +1,11 @@
-// One grasp (kinds.hpp), closed loop, in simulated time: the cell (cell.hpp), what two fingertips report of it, a controller, and a
-// gripper's mechanics. A simplified fingertip reports the truth with the kind's errors and noise. The firmware's own motion.c decides from
-// that whether it slides. The controller steps after every frame and every status of the gripper (gripper_line.hpp), and every 10 ms.
-// Deterministic but for step_us: the same grasp, seed and controller give the same bits.
+// One grasp (kinds.hpp), closed loop, in simulated time: the cell (cell.hpp), what two fingertips
+// report of it, a controller, and a gripper's mechanics.
+//
+// A simplified fingertip reports the truth with the kind's errors and noise. The firmware's own
+// motion.c decides from that whether it slides.
+//
+// The controller steps after every frame and every status of the gripper (gripper_line.hpp), and
+// every 10 ms. Deterministic but for step_us: the same grasp, seed and controller give the same bits.
 #pragma once
 
 #include "grasp/control/grip.hpp"

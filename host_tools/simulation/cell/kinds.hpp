@@ -1,6 +1,7 @@
-// Grasps as they differ from each other: rubber, object, lift, what happens then, and the line. All of it is drawn from ranges. A kind is a
-// set of ranges; kinds.cpp has them. The n-th grasp of a kind and seed is always the same. host_tools/grasp/control/CONTROL.md has the
-// table of kinds.
+// Grasps as they differ from each other: rubber, object, lift, what happens then, and the line.
+//
+// All of it is drawn from ranges. A kind is a set of ranges; kinds.cpp has them. The n-th grasp of
+// a kind and seed is always the same. host_tools/grasp/control/CONTROL.md has the table of kinds.
 #pragma once
 
 #include <array>

@@ -1,6 +1,8 @@
-// `fingertip simulate --lift`: an object between two fingertips on a gripper, which `fingertip grasp` grasps and a hand then lifts. Physics
-// and gripper run in this process, a fingertip's firmware in each of two others. Time that this process is held up is none for the world,
-// nor is time in which the others are waited for: fingertips and lines go on, with what is as it was. Lines of standard input are obeyed.
+// `fingertip simulate --lift`: an object between two fingertips on a gripper, which `fingertip grasp` grasps and a hand then lifts.
+//
+// Physics and gripper run in this process, a fingertip's firmware in each of two others. Time that
+// this process is held up is none for the world, nor is time in which the others are waited for:
+// fingertips and lines go on, with what is as it was. Lines of standard input are obeyed.
 #pragma once
 
 #include "simulation/cell/fingertip_cell_world.hpp"

@@ -1,7 +1,8 @@
 // `fingertip simulate --press`: a weight on a ball is set down evenly all over each fingertip, to look at, to record and to calibrate from.
-// With --mouse a hand presses instead (hand_server.hpp): the ball goes where the hand is, within some 30 ms, without friction. The pad: 12
-// mm of silicone without ends, which remembers as the twin's does (memory, aftereffect; twin/effects.hpp). Sensors' gains differ by 10 %,
-// and are not calibrated.
+// With --mouse a hand presses instead (hand_server.hpp): the ball goes where the hand is, within some 30 ms, without friction.
+//
+// The pad: 12 mm of silicone without ends, which remembers as the twin's does (memory, aftereffect; twin/effects.hpp).
+// Sensors' gains differ by 10 %, and are not calibrated.
 #pragma once
 
 #include "simulation/cell/place.hpp"

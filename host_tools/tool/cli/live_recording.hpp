@@ -16,7 +16,7 @@ class QueuedSink : public ByteSink {
 public:
   /* A file that grows. */
   QueuedSink(const std::string &path, bool overwrite);
-  /* capacity_bytes: while so many or more wait, append does too; 64 MB are 5 s of the CSV text of sixteen fingertips at 1308 frames/s. */
+  /* capacity_bytes: while these or more wait, append does too; 64 MB are 5 s of the CSV text of sixteen fingertips at 1308 frames/s. */
   explicit QueuedSink(std::unique_ptr<ByteSink> sink, std::size_t capacity_bytes = 64 << 20);
   /* Writes what waits; its error is lost. */
   ~QueuedSink() override;

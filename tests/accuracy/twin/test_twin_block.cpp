@@ -240,10 +240,10 @@ TEST(TwinBlock, TheTableIsTheSolution) {
   const Block block = around(12.0, 4.5);
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "block_table";
   std::filesystem::remove_all(folder);
-  double told = 0.0; // share that is done
+  double done = 0.0; // share
   const std::vector<Place> sensors{{9, 18}, {-9, 18}, {-9, -18}, {0, 9}};
-  const BlockTable table = BlockTable::load_or_build(block, sensors, folder, [&](double share) { told = share; });
-  EXPECT_EQ(told, 1.0);
+  const BlockTable table = BlockTable::load_or_build(block, sensors, folder, [&](double share) { done = share; });
+  EXPECT_EQ(done, 1.0);
   const BlockAnswer answer = solve_block(block, {{-9, 18}}, 0.7)[0]; // other nodes, no mirror
   const Eigen::Vector3d peak = 1e6 * LayerField{block.layer, 0.0}.peak();
   double off = 0.0;
@@ -263,10 +263,10 @@ TEST(TwinBlock, TheTableIsTheSolution) {
   EXPECT_EQ(table.added_Pa(0, {1, 0, 0, 0}, 99.0, 7.0), table.added_Pa(0, {1, 0, 0, 0}, block.half_x_mm, 7.0));
   // From the cache, and again where it is damaged.
   const auto again = [&] {
-    told = 0.0;
-    const BlockTable read = BlockTable::load_or_build(block, sensors, folder, [&](double share) { told = share; });
+    done = 0.0;
+    const BlockTable read = BlockTable::load_or_build(block, sensors, folder, [&](double share) { done = share; });
     EXPECT_EQ(read.added_Pa(3, load, -1.0, 2.0), table.added_Pa(3, load, -1.0, 2.0));
-    return told;
+    return done;
   };
   EXPECT_EQ(again(), 0.0);
   const std::filesystem::path file = std::filesystem::directory_iterator(folder)->path();

@@ -71,6 +71,7 @@ TEST(GripRow, ReadsWhatItWrote) {
   const GripRow read = grip_row("1530022.5," + cells);
   EXPECT_EQ(read.time_us, 1530022.5);
   EXPECT_EQ(grip_cells(read), cells);
+  EXPECT_NE(grip_cells(grip_row(with_cell("current_A", ""))).find(",9,,-17,"), std::string::npos); // unknown
 }
 
 TEST(GripRow, BeforeTheFirstAnswerTheGrippersCellsAreEmpty) {

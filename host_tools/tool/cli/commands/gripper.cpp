@@ -142,7 +142,7 @@ int info(Gripper &gripper, const std::string &port) {
   row("moving", status.moving ? "yes" : "no");
   row("object", status.object ? *status.object ? "yes" : "no" : "?");
   row("width_mm", fixed(status.width_mm, 2) + " of " + fixed(traits.stroke_mm, 1));
-  row("current_A", fixed(status.current_A, 2));
+  row("current_A", std::isnan(status.current_A) ? "?" : fixed(status.current_A, 2));
   row("fault", status.fault ? fault_of(gripper, status) : "none");
   advise_about_timer(port);
   return 0;

@@ -73,7 +73,7 @@ export class Traces {
   onResize: (() => void) | null = null;
   /** A part of it was drawn over. */
   onSelect: ((span: Span) => void) | null = null;
-  /** Wheel with Ctrl or ⌘, a pinch too: show so many times the time. */
+  /** Wheel with Ctrl or ⌘, a pinch too: shows a multiple of the time. */
   onZoom: ((times: number) => void) | null = null;
 
   constructor() {
