@@ -17,7 +17,7 @@ ExternalProject_Add(web_wasm_modules
   SOURCE_DIR ${CMAKE_SOURCE_DIR}
   BINARY_DIR ${wasm_dir}
   PREFIX ${CMAKE_BINARY_DIR}/web_wasm_modules
-  CONFIGURE_COMMAND ${CMAKE_COMMAND} --preset wasm -S ${CMAKE_SOURCE_DIR}
+  CONFIGURE_COMMAND ${CMAKE_COMMAND} --preset wasm -S ${CMAKE_SOURCE_DIR} -DFINGERTIP_PAD=${FINGERTIP_PAD}
   BUILD_COMMAND ${CMAKE_COMMAND} --build ${wasm_dir}
   INSTALL_COMMAND ${CMAKE_COMMAND} -E make_directory ${FINGERTIP_WEB_WASM_DIR}
   COMMAND ${CMAKE_COMMAND} -E copy_if_different ${wasm_modules} ${FINGERTIP_WEB_WASM_DIR}

@@ -1,11 +1,8 @@
 #include "simulation/cell/cell.hpp"
 
 #include "simulation/twin/effects.hpp"
+#include "simulation/twin/scenarios.hpp"
 #include "simulation/twin/traction.hpp"
-
-extern "C" {
-#include "config/geometry.h"
-}
 
 #include <algorithm>
 #include <cmath>
@@ -38,8 +35,8 @@ constexpr int MOTIONS = 8;           // six of the object, and each face along i
 constexpr double PAD_mm = 6.0, TABLE_ROLLS = 10.0, AWAY_m = 10.0, APART_mm = 200.0;
 
 double twist_arm_m(double force_N) { return SPIN * M * RADIUS_mm * std::cbrt(std::max(force_N, 0.05) / AT_N); }
-double pad_half_x_mm() { return PAD_OVERHANG_mm + static_cast<double>(geometry.x_mm[SENSORS - 1]); }
-double pad_half_y_mm() { return PAD_OVERHANG_mm + std::abs(static_cast<double>(geometry.y_mm[0])); }
+double pad_half_x_mm() { return PAD_OVERHANG_mm + twin::outermost_mm(geometry.x_mm); }
+double pad_half_y_mm() { return PAD_OVERHANG_mm + twin::outermost_mm(geometry.y_mm); }
 
 struct Size {
   const char *geom;

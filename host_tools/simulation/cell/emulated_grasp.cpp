@@ -15,7 +15,6 @@
 
 extern "C" {
 #include "common/contact_flags.h"
-#include "config/geometry.h"
 }
 
 #include <CLI/CLI.hpp>
@@ -381,7 +380,7 @@ int serve(const std::string &cache, double friction_falls) {
     put_u32(grasp.over());
     for (std::size_t f = 0; !grasp.over() && f < sent.size(); f++) {
       const Pressures sensed_Pa = grasp.sensed_Pa(f);
-      put(sensed_Pa.data(), sizeof sensed_Pa);
+      put(sensed_Pa.data(), SENSORS * sizeof sensed_Pa[0]);
       put_u32(sent[f].size());
       put(sent[f].data(), sent[f].size());
     }

@@ -1,9 +1,5 @@
 #include "simulation/cell/face.hpp"
 
-extern "C" {
-#include "config/geometry.h"
-}
-
 #include <algorithm>
 #include <cmath>
 #include <vector>

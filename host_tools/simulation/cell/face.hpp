@@ -1,12 +1,15 @@
 // What a fingertip's rubber meets: a patch of an object, its pressures from the twin's tables.
 //
-// A face is one of the twin's indenters (twin/indenter.hpp) on a layer without end, and what the fifteen
+// A face is one of the twin's indenters (twin/indenter.hpp) on a layer without end, and what the
 // sensors feel of it wherever it is and however it pulls. A line or an area is as many of them side by
 // side: the base's pressures add up, and rubber as thick as their distance does not resolve them. On an area wider than the layer the
 // middle carries more, as Gent and Lindley's bonded block does ("The compression of bonded rubber blocks", Proc. Inst. Mech. Eng. 173,
 // 1959; for rectangles Gent and Meinecke, Polymer Eng. Sci. 10, 1970): p = E strain (1 + P), Laplacian of P = -4 / h^2.
 #pragma once
 
+extern "C" {
+#include "config/geometry.h"
+}
 #include "simulation/twin/traction_table.hpp"
 #include "simulation/twin/trajectory.hpp"
 
@@ -16,9 +19,9 @@
 
 namespace fingertip::cell {
 
-constexpr std::size_t SENSORS = 15;
-constexpr double AIR_Pa = 101325.0, LAYER_mm = 12.0; // of rubber
-using Pressures = std::array<double, SENSORS>;       // Pa, on the base
+inline const std::size_t SENSORS = geometry.sensor_count;
+constexpr double AIR_Pa = 101325.0, LAYER_mm = 12.0;  // of rubber
+using Pressures = std::array<double, FT_MAX_SENSORS>; // [sensor] Pa, on the base
 
 // Its place is the centre of pressure, its angle that of its length.
 struct Patch : twin::Touch {

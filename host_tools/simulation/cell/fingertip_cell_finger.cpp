@@ -102,7 +102,7 @@ private:
     for (std::size_t k = 0; k < SENSORS; k++) {
       stored.sensors[k] = {static_cast<float>(finger_.gain[k] * (1.0 + sd * random.normal())), static_cast<float>(sd), 0, 0, 0};
     }
-    order(command_calibrate(stored, SENSORS));
+    order(command_calibrate(stored, geometry.sensor_count));
   }
 
   void order(const wire_packet &command) {

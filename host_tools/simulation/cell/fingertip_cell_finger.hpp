@@ -43,7 +43,7 @@ private:
   static constexpr std::uint64_t KEPT = 1024;
   struct Moment {
     std::atomic<std::int64_t> host_us;
-    std::array<std::atomic<float>, SENSORS> pressure_Pa;
+    std::array<std::atomic<float>, FT_MAX_SENSORS> pressure_Pa;
   };
   const Moment &moment(std::uint64_t number) const { return moments_[number % KEPT]; }
 

@@ -7,6 +7,7 @@
 #include "libfingertip/text.hpp"
 #include "simulation/cell/hand_server.hpp"
 #include "simulation/twin/effects.hpp"
+#include "simulation/twin/scenarios.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,8 +21,7 @@ enum Stream : std::uint64_t { PLACES = 862 };
 
 constexpr double GRAVITY_m_s2 = 9.80665;
 constexpr std::chrono::milliseconds ROUND{1}, VALIDATED_ROUND{5}; // a validation takes 50 frames a second
-// The twin's placements (twin/episodes.hpp). Each lasts long enough for a calibration to take it.
-constexpr double HALF_WIDTH_mm = 9.0, HALF_LENGTH_mm = 18.0;
+// Placements to the outer sensors, as the twin's. Each lasts long enough for a calibration to take it.
 constexpr double RESTS_s = 1.2, SETS_DOWN_s = 0.15, HOLDS_s = 1.5;
 constexpr double FOLLOWS_s = 0.012; // time constant of the ball after the hand
 constexpr double LIFTED_N = 0.005;
@@ -54,8 +54,8 @@ public:
     const double since_s = time_s - number * PERIOD_s - RESTS_s;
     const auto place = static_cast<std::uint64_t>(number);
     touch_ = {};
-    touch_.x_mm = HALF_WIDTH_mm * (2.0 * std::fmod(begin_x_ + spread(place, 2), 1.0) - 1.0);
-    touch_.y_mm = HALF_LENGTH_mm * (2.0 * std::fmod(begin_y_ + spread(place, 3), 1.0) - 1.0);
+    touch_.x_mm = twin::outermost_mm(geometry.x_mm) * (2.0 * std::fmod(begin_x_ + spread(place, 2), 1.0) - 1.0);
+    touch_.y_mm = twin::outermost_mm(geometry.y_mm) * (2.0 * std::fmod(begin_y_ + spread(place, 3), 1.0) - 1.0);
     touch_.force_N = weight_N_ * (smooth(since_s / SETS_DOWN_s) - smooth((since_s - SETS_DOWN_s - HOLDS_s) / SETS_DOWN_s));
     feel(time_s);
   }
@@ -76,7 +76,7 @@ public:
   }
   TrueTouch truth() const { return {{touch_.x_mm, touch_.y_mm, touch_.force_N}}; }
   Pressures pressures_Pa() const {
-    Pressures pressures;
+    Pressures pressures{};
     std::copy(sensed_Pa_.begin(), sensed_Pa_.end(), pressures.begin());
     return pressures;
   }
@@ -89,7 +89,7 @@ public:
 private:
   void feel(double time_s) {
     const Pressures pressures = touch_.force_N > 0.0 ? face_.base_Pa(touch_) : Pressures{};
-    std::copy(pressures.begin(), pressures.end(), base_Pa_.begin());
+    std::copy_n(pressures.begin(), SENSORS, base_Pa_.begin());
     rubber_.report(time_s, base_Pa_, sensed_Pa_);
   }
 

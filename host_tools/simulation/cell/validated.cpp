@@ -4,11 +4,8 @@
 #include "libfingertip/text.hpp"
 #include "simulation/cell/place.hpp"
 #include "simulation/cell/press.hpp"
+#include "simulation/twin/scenarios.hpp"
 #include "tool/calibration/solver.hpp"
-
-extern "C" {
-#include "config/geometry.h"
-}
 
 #include <algorithm>
 #include <cmath>
@@ -33,7 +30,7 @@ constexpr double SETTLED_Pa = 10000.0, SETTLED_s = 0.75;
 
 // As the template has them, in their order: protocol.py.
 constexpr double EMPTY_s = 60.0, HOLD_s = 30.0, REST_s = 30.0;
-constexpr std::size_t TURNS = 2, STRIDE = 7;
+constexpr std::size_t TURNS = 2, STRIDE_MIN = 7;
 
 struct Mark {
   double x_mm, y_mm;
@@ -42,14 +39,20 @@ struct Mark {
 // Each sensor, and the middle of each cell of four: columns half a pitch apart, that of sensors and that of cells in turn.
 std::vector<Mark> template_marks() {
   const double pitch_mm = static_cast<double>(geometry.pitch_mm);
+  const int across = static_cast<int>(std::lround(2.0 * twin::outermost_mm(geometry.x_mm) / pitch_mm));
+  const int along = static_cast<int>(std::lround(2.0 * twin::outermost_mm(geometry.y_mm) / pitch_mm));
   std::vector<Mark> sorted, marks;
-  for (int column = -2; column <= 2; column++) {
-    for (int row = column % 2 ? 3 : 4; row >= -4; row -= 2) {
+  for (int column = -across; column <= across; column++) {
+    for (int row = along - std::abs(across - column) % 2; row >= -along; row -= 2) {
       sorted.push_back({0.5 * pitch_mm * column, 0.5 * pitch_mm * row});
     }
   }
+  std::size_t stride = STRIDE_MIN;
+  while (std::gcd(stride, sorted.size()) > 1) {
+    stride++;
+  }
   for (std::size_t i = 0; i < sorted.size(); i++) {
-    marks.push_back(sorted[i * STRIDE % sorted.size()]);
+    marks.push_back(sorted[i * stride % sorted.size()]);
   }
   return marks;
 }
@@ -100,7 +103,7 @@ ValidatedPad::ValidatedPad(const ValidatedOptions &options)
 
 void ValidatedPad::choose_fault() {
   Random random(options_.seed, FAULT, 0);
-  const auto any = [&] { return std::min(static_cast<std::size_t>(random.uniform(0.0, 1.0) * SENSORS), SENSORS - 1); };
+  const auto any = [&] { return std::min(static_cast<std::size_t>(random.uniform(0.0, 1.0) * static_cast<double>(SENSORS)), SENSORS - 1); };
   const double sign = random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
   switch (options_.fault) {
   case PadFault::dead_sensor:
@@ -136,7 +139,7 @@ void ValidatedPad::choose_fault() {
 
 // Of rubber that is thicker by this factor the response is wider by it, and lower by its square.
 double ValidatedPad::width_at(double x_mm, double y_mm) const {
-  return 1.0 + tilt_x_ * x_mm / static_cast<double>(geometry.x_mm[SENSORS - 1]) + tilt_y_ * y_mm / static_cast<double>(geometry.y_mm[0]);
+  return 1.0 + tilt_x_ * x_mm / twin::outermost_mm(geometry.x_mm) - tilt_y_ * y_mm / twin::outermost_mm(geometry.y_mm);
 }
 
 std::vector<double> ValidatedPad::base_Pa(double x_mm, double y_mm) const {

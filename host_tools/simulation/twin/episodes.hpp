@@ -10,8 +10,12 @@
 
 namespace fingertip::twin {
 
-constexpr double GRID_STEP_mm = 4.5;
-constexpr double GRID_HALF_X_mm = 4.5, GRID_HALF_Y_mm = 13.5;
+// The paper's grid, on any pad: places half a pitch apart, which end half a pitch before the outer sensors.
+struct PaperGrid {
+  double step_mm, half_x_mm, half_y_mm;
+};
+PaperGrid grid_of_pad();
+
 constexpr double SPEED_UP_s = 0.01;
 constexpr double SLIDE_SPEED_MAX_mm_s = 200.0; // of the hand; a faster hand throws the object off the pad
 constexpr double DEGREE = M_PI / 180.0;
@@ -49,8 +53,8 @@ public:
   bool add(Episode episode);
   Place random_place(Random &random) const;
   // Half of where random places are.
-  double half_x_mm() const { return GRID_HALF_X_mm + *options.margin_mm; }
-  double half_y_mm() const { return GRID_HALF_Y_mm + *options.margin_mm; }
+  double half_x_mm() const { return grid_of_pad().half_x_mm + *options.margin_mm; }
+  double half_y_mm() const { return grid_of_pad().half_y_mm + *options.margin_mm; }
   // The speed of what is pushed or pulled in the nth episode.
   template <std::size_t N> double speed_mm_s(std::size_t n, const std::array<double, N> &usual_mm_s) const {
     const std::vector<double> &given_mm_s = options.speeds_mm_s;

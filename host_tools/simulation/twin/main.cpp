@@ -277,7 +277,8 @@ int run(int argc, char **argv) {
   option(write, "--dead-travel", s.dead_travel_mm, "MM", "Way of the pusher, or of the pulled object, before it slips; default 1");
   option(write, "--creep", s.creep_share, "SHARE", "Share of the dead travel by which the contact moves along; default 0.5");
   option(write, "--stick-slip", s.stick_slip_mm, "MM", "Slip in jumps of this size; default 0: steady");
-  option(write, "--margin", s.margin_mm, "MM", "Random places reach so far beyond the paper's grid; default 2.25, for placements 4.5");
+  option(write, "--margin", s.margin_mm, "MM",
+         "Random places reach so far beyond the paper's grid; default a quarter of the pitch, for placements half");
   option(write, "--quiet", s.quiet_s, "S", "Time between contacts; default 1.2");
   write->add_flag("--overwrite", options.overwrite, "Replace files that exist");
   with_cache(write);

@@ -15,7 +15,6 @@ extern "C" {
 
 namespace fingertip::twin {
 
-constexpr int GRID_PLACES_X = 3, GRID_PLACES_Y = 7;
 constexpr double SLIP_WAY_mm = 24.0, SLIP_SPAN_mm = 28.0;
 
 constexpr std::array<double, 5> SLIP_SPEEDS_mm_s{20, 50, 100, 150, 200}; // the paper: 5 of them
@@ -34,6 +33,19 @@ static Episode press(const std::string &name, Place place, double force_N, doubl
   return episode;
 }
 
+double outermost_mm(const float *places_mm) {
+  double most = 0.0;
+  for (std::size_t k = 0; k < geometry.sensor_count; k++) {
+    most = std::max(most, std::abs(static_cast<double>(places_mm[k])));
+  }
+  return most;
+}
+
+PaperGrid grid_of_pad() {
+  const double step_mm = 0.5 * static_cast<double>(geometry.pitch_mm);
+  return {step_mm, std::max(outermost_mm(geometry.x_mm) - step_mm, 0.0), std::max(outermost_mm(geometry.y_mm) - step_mm, 0.0)};
+}
+
 // The functions below make the nth episode of a kind.
 
 static Episode grid(const Stage &stage, std::size_t n) {
@@ -42,7 +54,10 @@ static Episode grid(const Stage &stage, std::size_t n) {
     double ramp_s, hold_s;
   };
   constexpr std::array<Way, 3> ways{{{"tap", 0.1, 0.1}, {"press", 0.8, 0.3}, {"hold", 0.25, 3.0}}};
-  std::array<int, GRID_PLACES_X * GRID_PLACES_Y> order{};
+  const PaperGrid grid = grid_of_pad();
+  const int across = 1 + static_cast<int>(std::lround(2.0 * grid.half_x_mm / grid.step_mm));
+  const int along = 1 + static_cast<int>(std::lround(2.0 * grid.half_y_mm / grid.step_mm));
+  std::vector<int> order(static_cast<std::size_t>(across * along));
   std::iota(order.begin(), order.end(), 0);
   const std::size_t way = n % ways.size(), nth_place = n / ways.size() % order.size();
   const std::size_t pass = n / (ways.size() * order.size());
@@ -51,14 +66,13 @@ static Episode grid(const Stage &stage, std::size_t n) {
     std::swap(order[i], order[random.next() % (i + 1)]);
   }
   const int at = order[nth_place];
-  const int row = at / GRID_PLACES_X - GRID_PLACES_Y / 2;
-  const int column = at % GRID_PLACES_X - GRID_PLACES_X / 2;
+  const int row = at / across, column = at % across;
   Random strength(stage.options.seed, GRID, n);
   // Forces in turn: after some passes every place has had all of them in every way.
   const std::size_t turn = static_cast<std::size_t>(at) + pass + 2 * way;
-  Episode episode = press(ways[way].name, {GRID_STEP_mm * column, GRID_STEP_mm * row}, stage.forces.pick(turn, strength.uniform(0.0, 1.0)),
-                          ways[way].ramp_s, ways[way].hold_s);
-  episode.sensors_near = (column % 2 != 0 ? 2 : 1) * (row % 2 != 0 ? 2 : 1);
+  const Place place{grid.step_mm * (column - across / 2), grid.step_mm * (row - along / 2)};
+  Episode episode = press(ways[way].name, place, stage.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[way].ramp_s, ways[way].hold_s);
+  episode.sensors_near = (column % 2 == 0 ? 2 : 1) * (row % 2 == 0 ? 2 : 1);
   return episode;
 }
 
@@ -144,7 +158,7 @@ static Episode slip(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, SLIP, n);
   const bool upward = random.uniform(0.0, 1.0) < 0.5;
   const double slack_mm = 0.5 * (SLIP_SPAN_mm - SLIP_WAY_mm);
-  const double x_mm = random.uniform(-GRID_HALF_X_mm, GRID_HALF_X_mm);
+  const double x_mm = random.uniform(-grid_of_pad().half_x_mm, grid_of_pad().half_x_mm);
   const double y_mm = -0.5 * SLIP_WAY_mm + random.uniform(-slack_mm, slack_mm);
   Episode episode;
   episode.press = "grip";
@@ -186,16 +200,8 @@ static Episode twist(const Stage &stage, std::size_t n) {
   return episode;
 }
 
-static double outermost(const float *places_mm) {
-  double most = 0.0;
-  for (std::size_t k = 0; k < geometry.sensor_count; k++) {
-    most = std::max(most, std::abs(static_cast<double>(places_mm[k])));
-  }
-  return most;
-}
-
 static double half_width_mm(const ScenarioOptions &options) {
-  return options.overhang_mm ? outermost(geometry.x_mm) + *options.overhang_mm : PAD_HALF_WIDTH_mm;
+  return outermost_mm(geometry.x_mm) + options.overhang_mm.value_or(PAD_OVERHANG_mm);
 }
 
 // The contact rolls across the pad's long edge, until nothing of it is left on the pad.
@@ -204,7 +210,7 @@ static Episode rolloff(const Stage &stage, std::size_t n) {
   Episode episode;
   episode.press = "roll";
   episode.speed_mm_s = stage.speed_mm_s(n, ROLL_SPEEDS_mm_s);
-  Track track = track_at({random.uniform(-2.0, 2.0), random.uniform(-GRID_HALF_Y_mm, GRID_HALF_Y_mm)});
+  Track track = track_at({random.uniform(-2.0, 2.0), random.uniform(-grid_of_pad().half_y_mm, grid_of_pad().half_y_mm)});
   track.along_x = 1.0;
   track.along_y = 0.0;
   const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
@@ -222,7 +228,7 @@ static Episode two(const Stage &stage, std::size_t n) {
   Random random(stage.options.seed, TWO, n);
   const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
   // The far ones lie along the pad, which is too narrow for them.
-  const double direction = distance > 2.0 * GRID_HALF_X_mm ? random.uniform(60.0, 120.0) : random.uniform(0.0, 180.0);
+  const double direction = distance > 2.0 * grid_of_pad().half_x_mm ? random.uniform(60.0, 120.0) : random.uniform(0.0, 180.0);
   const double half_x = 0.5 * distance * std::cos(direction * DEGREE);
   const double half_y = 0.5 * distance * std::sin(direction * DEGREE);
   const double x_mm = random.uniform(-2.0, 2.0), y_mm = random.uniform(-2.0, 2.0);
@@ -280,7 +286,7 @@ static std::string name_of(const ScenarioOptions &options) {
 
 const std::vector<ScenarioKind> &scenario_kinds() {
   static const std::vector<ScenarioKind> all{
-      {"grid", 200, "1,2.5,5,10,15", "tap, press and 3 s hold on each of the paper's 21 places, 4.5 mm apart", grid},
+      {"grid", 200, "1,2.5,5,10,15", "tap, press and 3 s hold on each place of a grid of half a pitch (the paper: 21, 4.5 mm apart)", grid},
       {"taps", 120, "1..15", "short taps at random places", tap},
       {"hold", 200, "1..15", "presses at random places, held for 0.2 to 10 s", hold},
       {"high", 120, "25..50", "strong presses at random places", high},
@@ -290,15 +296,14 @@ const std::vector<ScenarioKind> &scenario_kinds() {
       {"twist", 60, "6", "a gripped object turns by 90 degrees about its contact", twist},
       {"rolloff", 60, "6", "an object rolls over the pad's edge at 10, 25, 50 mm/s", rolloff},
       {"placements", 150, "3", "one weight set down at random places for 2 s each, to calibrate from", placement, "sphere15",
-       GRID_STEP_mm}, // to the outer sensors
-      {"lift", 120, "6", "a gripped object's weight, 0.3 of the grip's force, is taken over in 0.1, 0.3 and 1 s", lift, "sphere6",
-       0.5 * GRID_STEP_mm, "0.3", "0.5", true},
-      {"drag", 120, "3", "a weight on the pad is pulled along by a string: by 0.3 of it, then by what slides", drag, "sphere15",
-       0.5 * GRID_STEP_mm, "0.3", "0.5", true},
-      {"slide", 240, "6", "a gripped object of 0.1 to 0.5 kg slips where friction gives way: pulled, too heavy, let loose, or carried",
-       slide, "sphere6", 0.5 * GRID_STEP_mm, "0", "0.3..0.8", true},
-      {"screw", 60, "6", "a gripped object is turned by a torque until it spins, to either side", screw, "sphere6", 0.5 * GRID_STEP_mm, "0",
+       1.0}, // to the outer sensors
+      {"lift", 120, "6", "a gripped object's weight, 0.3 of the grip's force, is taken over in 0.1, 0.3 and 1 s", lift, "sphere6", 0.5,
+       "0.3", "0.5", true},
+      {"drag", 120, "3", "a weight on the pad is pulled along by a string: by 0.3 of it, then by what slides", drag, "sphere15", 0.5, "0.3",
        "0.5", true},
+      {"slide", 240, "6", "a gripped object of 0.1 to 0.5 kg slips where friction gives way: pulled, too heavy, let loose, or carried",
+       slide, "sphere6", 0.5, "0", "0.3..0.8", true},
+      {"screw", 60, "6", "a gripped object is turned by a torque until it spins, to either side", screw, "sphere6", 0.5, "0", "0.5", true},
       {"two", 60, "4..10", "two contacts at once, 6 to 30 mm apart", two},
   };
   return all;
@@ -370,7 +375,7 @@ bool Episode::slips(double t_s) const {
 }
 
 Block block_around(const Layer &layer, double overhang_mm) {
-  return {layer, outermost(geometry.x_mm) + overhang_mm, outermost(geometry.y_mm) + overhang_mm};
+  return {layer, outermost_mm(geometry.x_mm) + overhang_mm, outermost_mm(geometry.y_mm) + overhang_mm};
 }
 
 std::vector<Place> sensor_places() {
@@ -386,7 +391,7 @@ ScenarioOptions complete(const ScenarioOptions &options) {
   ScenarioOptions chosen = options;
   chosen.seconds = milliseconds(options.seconds.value_or(kind.usual_seconds));
   chosen.indenter = options.indenter.empty() ? kind.usual_indenter : options.indenter;
-  chosen.margin_mm = options.margin_mm.value_or(kind.usual_margin_mm);
+  chosen.margin_mm = options.margin_mm.value_or(kind.usual_margin_steps * grid_of_pad().step_mm);
   chosen.pad_seed = options.pad_seed.value_or(options.seed);
   chosen.forces = options.forces.empty() ? kind.usual_forces : options.forces;
   check("--seconds", *chosen.seconds, 1.0, 7200.0);

@@ -21,8 +21,8 @@ namespace fingertip::twin {
 
 constexpr double START_QUIET_s = 1.5;
 constexpr double AMBIENT_Pa = 101325.0;
-// In x, without overhang_mm; the paper's box is 30 mm by 50 mm.
-constexpr double PAD_HALF_WIDTH_mm = 15.0;
+// Without overhang_mm; the paper's box is 30 mm by 50 mm.
+constexpr double PAD_OVERHANG_mm = 6.0;
 
 class Stage;
 struct Episode;
@@ -33,7 +33,7 @@ struct ScenarioKind {
   std::string description;
   Episode (*episode)(const Stage &stage, std::size_t n); // the nth
   const char *usual_indenter = "sphere6";
-  double usual_margin_mm = 2.25; // half a step of the paper's grid
+  double usual_margin_steps = 0.5; // of the paper's grid
   const char *usual_tangential = "0", *usual_friction = "0.5";
   bool pulls_itself = false;
 };
@@ -120,6 +120,8 @@ struct Scenario {
 // The block that reaches this far beyond the outer sensors, and these.
 Block block_around(const Layer &layer, double overhang_mm);
 std::vector<Place> sensor_places();
+// Of one coordinate of the sensors' places.
+double outermost_mm(const float *places_mm);
 
 // With all that was left open filled in. Throws Error for an unknown kind or what is out of range.
 ScenarioOptions complete(const ScenarioOptions &options);

@@ -13,6 +13,7 @@ namespace fingertip::web {
 
 constexpr double AMBIENT_Pa = 101325.0;
 constexpr double PAD_mm = 12.0;
+constexpr double BEYOND_X_mm = 6.0, BEYOND_Y_mm = 7.0; // the outer sensors
 constexpr double GRAVITY_mm_s2 = 9806.65;
 constexpr double mN_PER_N = 1e3; // and mm/s2 per m/s2
 constexpr double SHEAR_N_mm2 = 1.0;
@@ -23,7 +24,17 @@ static bool all_finite(std::initializer_list<double> values) {
   return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
-static bool on_pad(double x_mm, double y_mm) { return std::abs(x_mm) <= World::HALF_WIDTH_mm && std::abs(y_mm) <= World::HALF_LENGTH_mm; }
+static double outermost_mm(const float *places_mm) {
+  const auto further = [](float one, float other) { return std::abs(one) < std::abs(other); };
+  return static_cast<double>(std::abs(*std::max_element(places_mm, places_mm + geometry.sensor_count, further)));
+}
+
+double World::half_width_mm() { return outermost_mm(geometry.x_mm) + BEYOND_X_mm; }
+double World::half_length_mm() { return outermost_mm(geometry.y_mm) + BEYOND_Y_mm; }
+
+static bool on_pad(double x_mm, double y_mm) {
+  return std::abs(x_mm) <= World::half_width_mm() && std::abs(y_mm) <= World::half_length_mm();
+}
 
 World::World(std::vector<Object> objects, const twin::EffectValues &errors, std::uint64_t seed)
     : objects_(std::move(objects)), object_(objects_.data()), errors_(errors, geometry.sensor_count, PAD_mm, AMBIENT_Pa, seed),

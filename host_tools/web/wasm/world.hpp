@@ -2,7 +2,7 @@
 // lies there, or that a grip holds while a load pulls.
 //
 // The pad: silicone of 12 mm without ends; objects are known from the twin's tables (objects.hpp), sensors' errors are its too
-// (twin/effects.hpp). An object touches where its middle is within the pad, 30 by 50 mm; beyond, it has fallen off.
+// (twin/effects.hpp). An object touches where its middle is within the pad, 30 by 50 mm on 3 x 5 sensors; beyond, it has fallen off.
 //
 // Friction is that of the simulated cell (bundle.hpp): Coulomb's, static then kinetic, with the rubber's give before all slides, which is 1
 // N/mm for each millimetre of contact radius. The middle of the contact goes along with the object. Objects do not turn, roll or tilt.
@@ -41,7 +41,7 @@ struct Truth {
 
 class World {
 public:
-  static constexpr double HALF_WIDTH_mm = 15.0, HALF_LENGTH_mm = 25.0;
+  static double half_width_mm(), half_length_mm();
   static constexpr double FORCE_MAX_N = 50.0, MASS_MIN_kg = 0.02, MASS_MAX_kg = 2.0;
   static constexpr double FRICTION_MIN = 0.1, FRICTION_MAX = 1.5, KINETIC_SHARE = 0.8;
   static constexpr double FOLLOWS_s = 0.015, LOAD_FOLLOWS_s = 0.1;

@@ -102,7 +102,7 @@ TEST(Face, AnAreaIsHeldInByItsOwnWidth) {
 static std::array<double, 3> fitted(const Pressures &base_Pa) {
   fit_array array{};
   EXPECT_EQ(fit_array_init(&array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm), FT_OK);
-  std::array<std::int32_t, SENSORS> q10{};
+  std::array<std::int32_t, FT_MAX_SENSORS> q10{};
   std::transform(base_Pa.begin(), base_Pa.end(), q10.begin(),
                  [](double pressure_Pa) { return static_cast<std::int32_t>(std::lround(1024.0 * pressure_Pa)); });
   fit_settings settings{};

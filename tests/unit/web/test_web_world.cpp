@@ -168,10 +168,10 @@ TEST_F(WorldTest, AWeightFallsBouncesAndLies) {
 }
 
 TEST_F(WorldTest, BesideThePadNothingIsTouched) {
-  world.press(World::HALF_WIDTH_mm + 0.1, 0.0, 6.0);
+  world.press(World::half_width_mm() + 0.1, 0.0, 6.0);
   EXPECT_EQ(run(0.5), 0.0);
   EXPECT_FALSE(world.truth().contact);
-  world.press(World::HALF_WIDTH_mm - 0.1, 0.0, 6.0);
+  world.press(World::half_width_mm() - 0.1, 0.0, 6.0);
   run(0.5);
   EXPECT_TRUE(world.truth().contact);
 }
