@@ -1,7 +1,6 @@
-// What to print, for OpenSCAD: choose a part, render it (F6), export it as STL (F7). Or: openscad -D 'part="mould"' -o mould.stl boards/mould.scad
+// What to print for a pad, which includes this: openscad -D 'part="mould"' -o mould.stl boards/pads/3x5.scad
 // Millimetres. Each part lies as it is printed. A circuit board has a base plate of its own: <board>/pcb/*-plate.scad.
 part = "mould"; // plate, frame, mould, walls
-include <mould_measures.scad>
 
 function wider(size, mm) = [size[0] + 2 * mm, size[1] + 2 * mm];
 

@@ -64,9 +64,9 @@ def copper(numbers, laid):
             yield f'  (via (at {um(x, y)}) {sizes} (layers "F.Cu" "B.Cu") (net {numbers[net]}))'
 
 
-def board_text(board, sensors):
+def board_text(board):
     """The .kicad_pcb."""
-    outside, parts = mould.measures(sensors).outside, layout.parts(board, sensors)
+    outside, parts = mould.measures(board.pad).outside, layout.parts(board)
     x, y = (mm / 2 for mm in outside)
     numbers = {net: n + 1 for n, net in enumerate(sorted({net for part in parts for net in part.nets.values()}))}
     lines = [

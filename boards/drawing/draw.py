@@ -8,8 +8,8 @@ draw.py --lay      lays circuit boards: a minute for each boards/<board>/pcb, in
 boards/<board>/wiring.svg                  from board.json
 boards/<board>/README.md, wiring and parts from board.json and parts.json
 boards/<board>/pcb/, picture, BOM, plate   from the .kicad_pcb there and parts.json
-boards/mould.svg, mould_measures.scad      at 1:1, from boards/pads/3x5.json
-boards/BUILD.md, measures                  the same as a table
+boards/pads/<pad>.svg, <pad>.scad          template at 1:1 and solids of the printed parts, from <pad>.json there
+boards/BUILD.md, measures                  the same of the boards' own pad as a table
 """
 
 import json
@@ -26,6 +26,7 @@ import pcb
 import wiring
 
 COMMAND = "boards/drawing/draw.py"
+OWN_PAD = "3x5.json"
 
 
 def filled(page, name, text, command=COMMAND):
@@ -36,19 +37,19 @@ def filled(page, name, text, command=COMMAND):
     return re.sub(f"{re.escape(begin)}.*?{re.escape(end)}", lambda _: f"{begin}\n\n{text}\n{end}", page, flags=re.DOTALL)
 
 
-def yageo(ohm):
-    """As a maker writes it: 2200 is 2K2."""
-    letter, unit = ("K", ohm / 1000) if ohm >= 1000 else ("R", ohm)
-    whole, _, rest = f"{unit:g}".partition(".")
-    return f"{whole}{letter}{rest}"
+def yageo(words):
+    """A resistance as a maker writes it: 2.2 kOhm is 2K2."""
+    value, unit = words.split()
+    whole, _, rest = value.partition(".")
+    return whole + {"Ohm": "R", "kOhm": "K"}[unit] + rest
 
 
-def part_of(parts, key):
-    """Its row of parts.json; a number is a resistance in ohms."""
-    if not isinstance(key, (int, float)):
-        return parts[key]
+def part_of(parts, name):
+    """Its row of parts.json, or that of resistors."""
+    if name in parts:
+        return parts[name]
     part = parts["resistor"]
-    return part | {"part": part["part"].format(wiring.ohms(key)), "order": part["order"].format(yageo(key))}
+    return part | {"part": part["part"].format(name), "order": part["order"].format(yageo(name))}
 
 
 def parts_table(board, parts):
@@ -61,10 +62,10 @@ def parts_table(board, parts):
 
 def laid(root):
     """{path: .kicad_pcb}"""
-    found, sensors = {}, geometry.places(root)
+    found = {}
     for path in sorted(root.glob("boards/*/pcb")):
         name, descriptor = path.parent.name, json.loads(path.with_name("board.json").read_text(encoding="utf-8"))
-        found[path / f"fingertip-{name}.kicad_pcb"] = board_file.board_text(wiring.board_of(name, descriptor), sensors)
+        found[path / f"fingertip-{name}.kicad_pcb"] = board_file.board_text(wiring.board_of(name, descriptor, root))
     return found
 
 
@@ -74,18 +75,18 @@ def drawings(root):
     parts = json.loads((boards / "parts.json").read_text(encoding="utf-8"))
     found = {}
     for path in sorted(boards.glob("*/board.json")):
-        board = wiring.board_of(path.parent.name, json.loads(path.read_text(encoding="utf-8")))
+        board = wiring.board_of(path.parent.name, json.loads(path.read_text(encoding="utf-8")), root)
         found[path.parent / "wiring.svg"] = wiring.drawn(board)
         page = path.parent / "README.md"
         text = filled(page.read_text(encoding="utf-8"), "wiring", wiring.table(board))
         found[page] = filled(text, "parts", parts_table(board, parts))
     for path in sorted(boards.glob("*/pcb/*.kicad_pcb")):
         found |= pcb.files(path, parts, part_of)
-    sensors = geometry.places(root)
-    found[boards / "mould_measures.scad"] = mould.scad(sensors)
-    found[boards / "mould.svg"] = mould.drawn(sensors)
+    pads = {path: geometry.pad(path) for path in sorted(boards.glob("pads/*.json"))}
+    for path, pad in pads.items():
+        found |= {path.with_suffix(".scad"): mould.scad(pad), path.with_suffix(".svg"): mould.drawn(pad)}
     page = boards / "BUILD.md"
-    found[page] = filled(page.read_text(encoding="utf-8"), "measures", mould.table(sensors))
+    found[page] = filled(page.read_text(encoding="utf-8"), "measures", mould.table(pads[boards / "pads" / OWN_PAD]))
     return found
 
 

@@ -6,7 +6,6 @@ fabricate.py FOLDER    writes FOLDER/<board>/ for each boards/<board>/pcb, and p
 Needs KiCad 6 (Debian: kicad, kicad-footprints). The same board gives the same bytes: dates and versions are left out.
 """
 
-import csv
 import json
 import pathlib
 import re
@@ -16,7 +15,6 @@ import tempfile
 import zipfile
 
 import pcbnew
-from sheet import number
 
 LAYERS = ("F_Cu", "B_Cu", "F_Mask", "B_Mask", "F_Paste", "B_Paste", "F_SilkS", "B_SilkS", "Edge_Cuts")
 DATED = re.compile(
@@ -53,16 +51,6 @@ def plotted(board, folder):
     return {path.name: DATED.sub("", path.read_text(encoding="utf-8")) for path in sorted(pathlib.Path(folder).iterdir())}
 
 
-def placements(board):
-    """The placement file as many houses take it: places as in the Gerbers, parts turned counter-clockwise, seen from their side."""
-    own = pcbnew.PLACE_FILE_EXPORTER(board, True, False, False, True, True, True, True).GenPositionData()
-    rows = ["Designator,Mid X,Mid Y,Layer,Rotation"]
-    for name, _, _, x, y, turn, side in csv.reader(own.splitlines()[1:]):  # of the back, KiCad 6 has x as seen from there
-        x, turn = (-float(x), 180 - float(turn)) if side == "bottom" else (float(x), float(turn))
-        rows.append(f"{name},{number(x)}mm,{number(float(y))}mm,{side.title()},{turn % 360:g}")
-    return "\n".join(rows) + "\n"
-
-
 def main(argv):
     if len(argv) != 1:
         print(__doc__, file=sys.stderr)
@@ -75,7 +63,6 @@ def main(argv):
             board, found = judged(path, folder / "rule-check.txt")
             for name, text in plotted(board, scratch).items():
                 out.writestr(zipfile.ZipInfo(name), text)
-        (folder / f"{path.stem}-placement.csv").write_text(placements(board), encoding="utf-8")
         for file in (*path.parent.glob("*.csv"), *path.parent.glob("*.svg")):
             shutil.copy(file, folder)
         print(f"{folder}: {json.dumps(found)}")

@@ -1,15 +1,30 @@
-"""The sensors' places, as the firmware has them (boards/pads)."""
+"""A pad, as boards/pads/README.md has it."""
 
+import dataclasses
 import json
 import pathlib
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PACKAGE_mm = 3.3  # of an MS5840, each way (De Clercq et al., RA-L 2022, section III.A)
-PACKAGE_HIGH_mm = 1.7  # there
+PACKAGE_mm = 3.3  # of a sensor, each way (De Clercq et al., RA-L 2022, section III.A; TE's data sheet of the MS5837-30BA)
+SENSORS = {"ms5840": ("MS5840-02BA", 1.7), "ms5837_30ba": ("MS5837-30BA", 2.75)}  # key of parts.json; height in mm, there
+# Where the pad says nothing: the layer of most figures in host_tools/report, and three quarters of it (host_tools/README.md, "Tangential force").
+RUBBER = {"thickness_mm": 12.0, "overhang_mm": 9.0}
 
 
-def places(root=ROOT):
-    """[[x_mm, y_mm]] of the sensors."""
-    pad = json.loads((root / "boards/pads/3x5.json").read_text(encoding="utf-8"))
-    columns, rows, pitch_mm = pad["columns"], pad["rows"], pad["pitch_mm"]
-    return [[pitch_mm * (k // rows - (columns - 1) / 2), pitch_mm * (k % rows - (rows - 1) / 2)] for k in range(columns * rows)]
+@dataclasses.dataclass
+class Pad:
+    name: str
+    places: list  # [x_mm, y_mm] of each sensor
+    pitch_mm: float
+    part: str  # of the sensors
+    high_mm: float  # of a sensor
+    thickness_mm: float
+    overhang_mm: float
+
+
+def pad(path):
+    found = json.loads(path.read_text(encoding="utf-8"))
+    places, columns, rows, pitch_mm = (found.get(key) for key in ("places_mm", "columns", "rows", "pitch_mm"))
+    if not places:
+        places = [[pitch_mm * (k // rows - (columns - 1) / 2), pitch_mm * (k % rows - (rows - 1) / 2)] for k in range(columns * rows)]
+    return Pad(found["name"], places, pitch_mm, *SENSORS[found["sensor"]], **RUBBER | found.get("rubber", {}))

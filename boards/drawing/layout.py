@@ -12,6 +12,7 @@ import pico
 import wiring
 
 BESIDE_mm, APART_mm = 3.4, 1.6  # capacitor and resistors of a sensor from its middle: to its sides, and from each other
+ROOMY_mm = 8.3  # pitch from which there is room on both sides
 EDGE_mm, PULLS_mm, CONNECTOR_mm = 26, 5, 3.5  # the middles of Pico, resistors of the bus and connector from the board's edge
 MULTIPLEXER_mm = 8.5  # its middle from the outer sensors
 HEAD_mm = 3.2  # of an M3's nut across its corners, half
@@ -54,17 +55,19 @@ class Parts(list):
     def capacitor(self, x, y, turn, back=False):
         self.part("C", CAPACITOR, x, y, turn, back, {1: "3V3", 2: "GND"}, "100 nF")
 
-    def sensor(self, x, y, data, clock):
-        self.part("U", SENSOR, x, y, 0, False, {1: "GND", 2: "3V3", 3: clock, 4: data}, "MS5840-02BA")
-        self.capacitor(x - BESIDE_mm, y, 90)
+    def sensor(self, part, x, y, data, clock, pulls):
+        """pulls: {net: (side, ohms)}"""
+        self.part("U", SENSOR, x, y, 0, False, {1: "GND", 2: "3V3", 3: clock, 4: data}, part)
+        self.capacitor(x - BESIDE_mm, y + APART_mm, 270)
+        for net, (side, ohm) in pulls.items():
+            self.resistor(x + side * BESIDE_mm, y - APART_mm, 270, ohm, net)
 
 
-def parallel(board, sensors, edge):
+def parallel(board, edge):
     """The Pico is on the back: no cable."""
-    parts, ohm = Parts(), board.pull_ups_ohm
-    for k, (x, y) in enumerate(sensors):
-        parts.sensor(x, -y, f"SDA{k}", "SCL")
-        parts.resistor(x + BESIDE_mm, -y - APART_mm, 270, ohm["sda"], f"SDA{k}")
+    parts, ohm, side = Parts(), board.pull_ups_ohm, 1 if board.pad.pitch_mm > ROOMY_mm else -1
+    for k, (x, y) in enumerate(board.pad.places):
+        parts.sensor(board.pad.part, x, -y, f"SDA{k}", "SCL", {f"SDA{k}": (side, ohm["sda"])})
     parts.resistor(8, edge + PULLS_mm, 0, ohm["scl"], "SCL")
     nets = dict.fromkeys([*pico.grounds(), pico.pin("AGND")], "GND") | {pico.pin("3V3"): "3V3"}
     nets |= {pico.pin(f"GP{k}"): f"SDA{k}" for k in range(board.sensors)} | {pico.pin(f"GP{board.wiring['pin_scl']}"): "SCL"}
@@ -75,16 +78,14 @@ def parallel(board, sensors, edge):
     return parts
 
 
-def multiplexed(board, sensors, edge):
+def multiplexed(board, edge):
     """A cable leads to the Pico."""
     parts, ohm = Parts(), board.pull_ups_ohm
     if board.strips > 3:
         raise wiring.Unwired(f"boards/{board.name}: {board.strips} strips; a circuit board has a place and a wire for three")
-    for k, (x, y) in enumerate(sensors):
-        parts.sensor(x, -y, f"SDA{k}", f"SCL{k}")
-        parts.resistor(x + BESIDE_mm, -y - APART_mm, 270, ohm["channel"], f"SDA{k}")
-        parts.resistor(x + BESIDE_mm, -y + APART_mm, 270, ohm["channel"], f"SCL{k}")
-    right, down = (max(abs(place[axis]) for place in sensors) + MULTIPLEXER_mm for axis in (0, 1))
+    for k, (x, y) in enumerate(board.pad.places):
+        parts.sensor(board.pad.part, x, -y, f"SDA{k}", f"SCL{k}", {f"SDA{k}": (-1, ohm["channel"]), f"SCL{k}": (1, ohm["channel"])})
+    right, down = (max(abs(place[axis]) for place in board.pad.places) + MULTIPLEXER_mm for axis in (0, 1))
     beside = [(-right, 0, 180, -1.3, -6), (0, down, 270, -6, 1.3), (right, 0, 0, 1.3, 6)]  # the last two: to its capacitor
     for strip, (x, y, turn, dx, dy) in zip(range(board.strips), beside):
         nets = {12: "GND", 24: "3V3", 22: "SCL", 23: "SDA", 3: f"RESET{strip}"} | dict(zip((21, 2, 1), wiring.levels(board, strip)))
@@ -100,9 +101,9 @@ def multiplexed(board, sensors, edge):
     return parts
 
 
-def parts(board, sensors):
-    measures = mould.measures(sensors)
-    found = (parallel if board.bus == "parallel" else multiplexed)(board, sensors, -measures.outside[1] / 2)
+def parts(board):
+    measures = mould.measures(board.pad)
+    found = (parallel if board.bus == "parallel" else multiplexed)(board, -measures.outside[1] / 2)
     for x, y in measures.screws:
         found.part("H", SCREW, x, -y, 0, False, {}, "")
     return found

@@ -1,16 +1,14 @@
-"""mould.svg, mould_measures.scad and the table of measures: the base plate around the sensors, the skin's mould, and the frame that clamps the skin.
+"""PAD.svg, PAD.scad and the table of measures: the base plate around the sensors, the skin's mould, and the frame that clamps the skin.
 
-All follows from the sensors' places and the choices below. None of it was made yet.
+All follows from the pad and the choices below. None of it was made yet.
 """
 
 import dataclasses
 import json
 
-from geometry import PACKAGE_HIGH_mm, PACKAGE_mm
+from geometry import PACKAGE_mm
 from sheet import across, circle, cross, down, rectangle, ruler, sheet, text
 
-RUBBER_mm = 12.0  # above the sensors: the layer of most figures in host_tools/report
-OVERHANG_mm = 9.0  # of rubber beyond the outer sensors: three quarters of its thickness (host_tools/README.md, "Tangential force")
 FLANGE_mm = 5.0  # of the skin, all around, under the frame
 FLANGE_HIGH_mm = 3.0
 SQUEEZED = 0.1  # share of its height that the frame takes from the flange
@@ -35,13 +33,13 @@ class Measures:
     volume_ml: float
 
 
-def measures(sensors):
-    reach = [max(abs(place[axis]) for place in sensors) for axis in (0, 1)]
-    skin = tuple(2 * (mm + OVERHANG_mm) for mm in reach)
+def measures(pad):
+    reach = [max(abs(place[axis]) for place in pad.places) for axis in (0, 1)]
+    skin = tuple(2 * (mm + pad.overhang_mm) for mm in reach)
     flange = tuple(mm + 2 * FLANGE_mm for mm in skin)
     outside = tuple(mm + 2 * RIM_mm for mm in flange)
     x, y = ((mm + RIM_mm) / 2 for mm in flange)
-    volume_mm3 = skin[0] * skin[1] * (RUBBER_mm - FLANGE_HIGH_mm) + flange[0] * flange[1] * FLANGE_HIGH_mm
+    volume_mm3 = skin[0] * skin[1] * (pad.thickness_mm - FLANGE_HIGH_mm) + flange[0] * flange[1] * FLANGE_HIGH_mm
     return Measures(
         skin,
         flange,
@@ -54,14 +52,17 @@ def measures(sensors):
     )
 
 
-def table(sensors):
+def table(pad):
     """Markdown."""
-    m = measures(sensors)
+    m = measures(pad)
     size = lambda each, more=0: f"{each[0] + more:g} x {each[1] + more:g} mm"
-    (x, y), hollow = m.screws[-1], f"face down, in a block of {size(m.flange, 2 * WALL_mm)}, {RUBBER_mm + WALL_mm:g} mm high, open above"
+    (x, y), hollow = (
+        m.screws[-1],
+        f"face down, in a block of {size(m.flange, 2 * WALL_mm)}, {pad.thickness_mm + WALL_mm:g} mm high, open above",
+    )
     rows = [
-        ("base plate", f"{size(m.outside)}, {PACKAGE_HIGH_mm:g} mm thick; a square hole of {m.hole_mm:g} mm for each sensor"),
-        ("rubber that is touched", f"{size(m.skin)}, {RUBBER_mm:g} mm thick: {OVERHANG_mm:g} mm beyond the outer sensors"),
+        ("base plate", f"{size(m.outside)}, {pad.high_mm:g} mm thick; a square hole of {m.hole_mm:g} mm for each sensor"),
+        ("rubber that is touched", f"{size(m.skin)}, {pad.thickness_mm:g} mm thick: {pad.overhang_mm:g} mm beyond the outer sensors"),
         ("its flange", f"{size(m.flange)}, {FLANGE_HIGH_mm:g} mm thick, at the sensors"),
         ("mould of the skin", f"the same hollow, {hollow}"),
         ("rubber in it", f"{m.volume_ml:.0f} ml"),
@@ -70,21 +71,16 @@ def table(sensors):
             f"{size(m.outside)}; a ring {m.ring_mm:g} mm high around the flange, a lid of {LID_mm:g} mm that leaves {size(m.opening)} open",
         ),
         ("screws", f"{len(m.screws)} M3, {2 * x:g} mm apart across and {y:g} mm along; holes of {SCREW_mm:g} mm"),
-        ("walls to cast on", f"{size(m.outside)}, {RUBBER_mm:g} mm high, inside {size(m.skin)}; on the base plate"),
+        ("walls to cast on", f"{size(m.outside)}, {pad.thickness_mm:g} mm high, inside {size(m.skin)}; on the base plate"),
     ]
     return "\n".join(["| part | measures |", "|---|---|", *(f"| {name} | {value} |" for name, value in rows)]) + "\n"
 
 
-def scad(sensors):
-    """Variables of mould.scad."""
-    values = dataclasses.asdict(measures(sensors)) | {
-        "sensors": sensors,
-        "screw_mm": SCREW_mm,
-        "plate_mm": PACKAGE_HIGH_mm,
-        "lid_mm": LID_mm,
-    }
-    values |= {"play_mm": FRAME_PLAY_mm, "wall_mm": WALL_mm, "rubber_mm": RUBBER_mm, "flange_mm": FLANGE_HIGH_mm}
-    return "".join(["// Written by boards/drawing/draw.py.\n", *(f"{name} = {json.dumps(value)};\n" for name, value in values.items())])
+def scad(pad):
+    values = dataclasses.asdict(measures(pad)) | {"sensors": pad.places, "screw_mm": SCREW_mm, "plate_mm": pad.high_mm, "lid_mm": LID_mm}
+    values |= {"play_mm": FRAME_PLAY_mm, "wall_mm": WALL_mm, "rubber_mm": pad.thickness_mm, "flange_mm": FLANGE_HIGH_mm}
+    lines = (f"{name} = {json.dumps(value)};\n" for name, value in values.items())
+    return "".join(["// Written by boards/drawing/draw.py.\n", *lines, "include <../mould.scad>\n"])
 
 
 def plate(x, y, m, sensors):
@@ -120,14 +116,14 @@ def hollow(x, y, m):
     return lines + down(x - m.skin[0] / 2 + 4, y - m.skin[1] / 2, m.skin[1], f"{m.skin[1]:g}")
 
 
-def section(x, base_y, m, sensors):
+def section(x, base_y, m, pad):
     """Across the pad, assembled; base_y: the upper side of the base plate."""
+    high, low = pad.thickness_mm, m.ring_mm
     half, flange, outside = m.skin[0] / 2, m.flange[0] / 2, m.outside[0] / 2
-    lines = [text(x - outside, base_y - RUBBER_mm - 5, "section, assembled: skin, frame, base plate")]
-    lines.append(rectangle(x, base_y + PACKAGE_HIGH_mm / 2, 2 * outside, PACKAGE_HIGH_mm))
-    for sx in sorted({sx for sx, _ in sensors}):
-        lines.append(rectangle(x + sx, base_y + PACKAGE_HIGH_mm / 2, PACKAGE_mm, PACKAGE_HIGH_mm, "cut"))
-    high, low = RUBBER_mm, m.ring_mm
+    lines = [text(x - outside, base_y - high - 5, "section, assembled: skin, frame, base plate")]
+    lines.append(rectangle(x, base_y + pad.high_mm / 2, 2 * outside, pad.high_mm))
+    for sx in sorted({sx for sx, _ in pad.places}):
+        lines.append(rectangle(x + sx, base_y + pad.high_mm / 2, PACKAGE_mm, pad.high_mm, "cut"))
     lines.append(
         f'  <path class="cut" d="M{x - flange:g} {base_y:g}v{-low:g}h{flange - half:g}v{low - high:g}h{2 * half:g}v{high - low:g}h{flange - half:g}v{low:g}z"/>'
     )
@@ -140,10 +136,10 @@ def section(x, base_y, m, sensors):
     return lines + down(x + outside + 2, base_y - low, low, f"{low:g}")
 
 
-def drawn(sensors):
-    m = measures(sensors)
+def drawn(pad):
+    m = measures(pad)
     step_x, step_y = m.outside[0] + DRAWN_APART_mm, m.outside[1] + DRAWN_APART_mm + 4
-    lines = plate(0, 0, m, sensors) + frame(step_x, 0, m) + hollow(0, step_y, m) + section(step_x, step_y - 10, m, sensors)
+    lines = plate(0, 0, m, pad.places) + frame(step_x, 0, m) + hollow(0, step_y, m) + section(step_x, step_y - 10, m, pad)
     lines += ruler(step_x - m.outside[0] / 2, step_y + 14)
     left, top = -m.outside[0] / 2 - 8, -m.outside[1] / 2 - 10
     return sheet("Base plate, mould and frame, 1:1", left, top, step_x + m.outside[0] + 16, step_y + m.outside[1] + 16, lines)

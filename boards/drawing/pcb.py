@@ -5,8 +5,6 @@ import json
 import pcb_check
 import sheet
 
-# Keys of parts.json by a name's first letter; R has its ohms.
-ORDERED = {"U": "sensor", "C": "capacitor", "M": "multiplexer", "X": "connector", "A": "pico"}
 # In the base plate: screws and solder leave more play than a template; pockets have theirs around the pads of a part.
 HOLE_mm, PLAY_mm, POCKET_mm = 3.7, 0.3, 1.1
 
@@ -14,14 +12,25 @@ HOLE_mm, PLAY_mm, POCKET_mm = 3.7, 0.3, 1.1
 def bom(board, listed, part_of):
     found = {}
     for name, (*_, value) in board.parts.items():
-        key = pcb_check.ohms(value) if name[0] == "R" else ORDERED.get(name[0])
-        if key is not None:
-            row = json.dumps([value, *(part_of(listed, key)[word] for word in ("maker", "order"))], separators=(",", ":"))[1:-1]
+        if value:
+            part = part_of(listed, value)
+            row = json.dumps([value, part["maker"], part["order"]], separators=(",", ":"))[1:-1]
             found.setdefault(row, []).append(name)
     return "\n".join(["Comment,Maker,Order number,Designator", *(f'{row},"{",".join(names)}"' for row, names in found.items())]) + "\n"
 
 
-def plate(board):
+def placements(board):
+    """As many houses take it: places as in the Gerbers, parts turned counter-clockwise, seen from their side."""
+    rows = ["Designator,Mid X,Mid Y,Layer,Rotation"]
+    for name, (x, y, turn, back, value) in board.parts.items():
+        if value:
+            rows.append(
+                f"{name},{sheet.number(x)}mm,{sheet.number(-y)}mm,{'Bottom' if back else 'Top'},{(180 - turn if back else turn) % 360}"
+            )
+    return "\n".join(rows) + "\n"
+
+
+def plate(board, pad):
     """The base plate that the board needs, for OpenSCAD: a hole for each sensor, and from below a pocket for what else is on the front."""
     holes, pockets = [], []
     for part, (x, y, _, back, _) in board.parts.items():
@@ -31,7 +40,7 @@ def plate(board):
             ends = [board.pads[part, pad] for pad in "12"]
             pockets.append([x, -y, *(abs(ends[0][axis] - ends[1][axis]) + ends[0][axis + 2] + 2 * PLAY_mm for axis in (0, 1))])
     both = ", ".join(str([[round(mm, 4) + 0.0 for mm in place] for place in places]) for places in (holes, pockets))
-    return f'// Written by boards/drawing/draw.py.\ninclude <../../mould.scad>\npart = "";\nplate({both}, {POCKET_mm});\n'
+    return f'// Written by boards/drawing/draw.py.\ninclude <../../pads/{pad}.scad>\npart = "";\nplate({both}, {POCKET_mm});\n'
 
 
 def drawn(board, name):
@@ -55,5 +64,11 @@ def drawn(board, name):
 def files(path, listed, part_of):
     """{path: text}. path: the .kicad_pcb."""
     board = pcb_check.Board(path.read_text(encoding="utf-8"))
-    texts = {"-bom.csv": bom(board, listed, part_of), "-plate.scad": plate(board), ".svg": drawn(board, path.parents[1].name)}
+    pad = json.loads((path.parents[1] / "board.json").read_text(encoding="utf-8"))["pad"]
+    texts = {
+        "-bom.csv": bom(board, listed, part_of),
+        "-placement.csv": placements(board),
+        "-plate.scad": plate(board, pad),
+        ".svg": drawn(board, path.parents[1].name),
+    }
     return {path.with_name(path.stem + ending): text for ending, text in texts.items()}

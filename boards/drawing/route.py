@@ -1,86 +1,75 @@
-"""Lays tracks: A* on a grid of two layers. A track may cross those of other nets at a price; these are taken up and laid again, and where they met it gets dearer.
+"""Lays tracks: A* on a grid of two layers. A net may cross others at a price; these are taken up and laid again, and where they met it gets dearer.
 
-All in whole micrometres and whole costs: the same pads give the same tracks on every machine. A node is a cell of the front, or `cells` more: of the back.
-An edge is (node, higher node); from one layer to the other it is a via.
+All in whole micrometres and whole costs: the same pads give the same tracks on every machine. A cell has three nodes: a track on the front,
+a track on the back, a via. An edge is (node, higher node) of tracks; from one layer to the other it is a via.
 """
 
 import collections
 import heapq
+import math
 
 import wiring
 
 GRID_um, TRACK_um, VIA_um, DRILL_um = 250, 250, 600, 300
 CLEARANCE_um, EDGE_um = 190, 500  # copper to copper, and to the board's edge
-STEP, DIAGONAL, TURN, THROUGH, CROSS, MET = 10, 14, 3, 120, 50, 15  # costs; the last is added where nets met
+STEP, DIAGONAL, TURN, THROUGH, CROSS, MET = 10, 14, 3, 120, 50, 60  # costs; the last is added where nets met
+FRONT, BACK, VIA = 0, 1, 2
 TAKEN, FAR, ROUNDS = -1, 10**9, 3000
-EIGHT = [(dx, dy) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
 
 
 class Grid:
     def __init__(self, width, height):
-        self.half = [round(mm * 500) // GRID_um for mm in (width, height)]
+        self.half = [round(mm * 500) // GRID_um + 4 for mm in (width, height)]  # what is near the edge is on it, too
         self.nx = 2 * self.half[0] + 1
         self.cells = self.nx * (2 * self.half[1] + 1)
-        # Nets whose pads are near, or TAKEN, and how many tracks are near: for tracks by node, for vias by cell.
-        self.fixed = {TRACK_um: [0] * (2 * self.cells), VIA_um: [0] * self.cells}
-        self.crowd = {kind: [0] * len(nets) for kind, nets in self.fixed.items()}
-        self.met = [0] * (2 * self.cells)
-        self.steps = [(dx + dy * self.nx, DIAGONAL if dx and dy else STEP, dx, dy * self.nx) for dx, dy in EIGHT]
-        # How far a cell is from one where a track beside a track, a track beside a via, a via beside a via would be too near.
+        self.fixed = [0] * (3 * self.cells)  # the net whose pads are near, or TAKEN
+        self.met = collections.Counter()  # how often nets met at a node
+        # Steps to nodes where a track beside a track, a track beside a via, a via beside a via would be too near.
         reach = (CLEARANCE_um + (a + b) // 2 for a, b in ((TRACK_um, TRACK_um), (TRACK_um, VIA_um), (VIA_um, VIA_um)))
-        self.around = [[cell - self.cells // 2 for cell in self.near((0, 0, 0, 0), um)] for um in reach]
+        beside, through, apart = ([3 * (cell - self.cells // 2) for cell in self.near((0, 0, 0, 0), um)] for um in reach)
+        self.beside, self.through, self.apart = (
+            beside,
+            [step + side for step in through for side in (FRONT, BACK)],
+            [step + VIA for step in apart],
+        )
+        # By layer: (step, cost, nodes that must be free). A via needs what tracks on both layers need, here and around.
+        eight = [(3 * (dx + dy * self.nx), 3 * dx, 3 * dy * self.nx) for dx in (-1, 0, 1) for dy in (-1, 0, 1) if dx or dy]
+        ways = [(step, DIAGONAL, (step, dx, dy)) if dx and dy else (step, STEP, (step, 0)) for step, dx, dy in eight]
+        self.room = [VIA, *(step + side for step in (0, *(way[0] for way in eight)) for side in (FRONT, BACK))]
+        self.ways = [[*ways, (BACK, THROUGH, self.room)], [*ways, (-BACK, THROUGH, [step - BACK for step in self.room])]]
 
     def near(self, rectangle, reach):
         """Cells whose middle is within reach of it. Left, top, right, bottom."""
         left, top, right, bottom = rectangle
-        xs, ys = (
-            [GRID_um * i for i in range(max(-((reach - low) // GRID_um), -half), min((high + reach) // GRID_um, half) + 1)]
-            for low, high, half in ((left, right, self.half[0]), (top, bottom, self.half[1]))
-        )
-        for x, y in ((x, y) for y in ys for x in xs):
+        xs, ys = (range(-((reach - low) // GRID_um), (high + reach) // GRID_um + 1) for low, high in ((left, right), (top, bottom)))
+        for x, y in ((GRID_um * x, GRID_um * y) for y in ys for x in xs):
             if max(left - x, 0, x - right) ** 2 + max(top - y, 0, y - bottom) ** 2 <= reach**2:
                 yield self.cells // 2 + y // GRID_um * self.nx + x // GRID_um
 
     def place(self, node):
-        y, x = divmod(node % self.cells, self.nx)
+        y, x = divmod(node // 3, self.nx)
         return (x - self.half[0]) * GRID_um, (y - self.half[1]) * GRID_um
 
-    def fix(self, rectangle, layers, net, clearance=CLEARANCE_um):
-        """layers: of the tracks for which it is in the way; it always is for vias."""
-        for kind, planes in ((TRACK_um, layers), (VIA_um, (0,))):
-            fixed = self.fixed[kind]
-            for cell in self.near(rectangle, kind // 2 + clearance):
-                for node in (cell + plane * self.cells for plane in planes):
-                    fixed[node] = net if fixed[node] in (0, net) else TAKEN
+    def fix(self, rectangle, kinds, net, clearance=CLEARANCE_um):
+        for kind in kinds:
+            for cell in self.near(rectangle, clearance + (VIA_um if kind == VIA else TRACK_um) // 2):
+                owner = self.fixed[3 * cell + kind]
+                self.fixed[3 * cell + kind] = net if owner in (0, net) else TAKEN
 
-    def takes(self, nodes, vias):
-        """{kind: where it would be too near}"""
-        beside, through, apart = self.around
-        both = [step + back for step in through for back in (0, self.cells)]
-        tracks = {node + step for node in nodes for step in beside} | {via + step for via in vias for step in both}
-        holes = {node % self.cells + step for node in nodes for step in through} | {via + step for via in vias for step in apart}
-        return {TRACK_um: tracks, VIA_um: holes}
+    def room_of(self, edges):
+        """Nodes that must be free; and those where others would be too near."""
+        nodes, vias = {node for edge in edges for node in edge}, [a for a, b in edges if b - a == BACK]
+        takes = {node + step for node in nodes for step in self.beside} | {via + step for via in vias for step in self.through}
+        return nodes | {via + step for via in vias for step in self.room}, takes
 
-    def count(self, taken, by):
-        for kind, nodes in taken.items():
-            for node in nodes:
-                self.crowd[kind][node] += by
-
-    def path(self, net, begin, goal, edges, own):
-        """The cheapest edges from begin to goal, sets of nodes. edges: those that the net has; own: its part of the crowd."""
-        cells, nx = self.cells, self.nx
-        gy, gx = divmod(min(goal, default=0) % cells, nx)
-        too_near = {a + step for a, b in edges if b - a == cells for step in self.around[2]}
+    def path(self, begin, goal, price):
+        """The cheapest edges from begin to goal, sets of nodes."""
+        gx, gy = self.place(min(goal))
 
         def rest(node):
-            y, x = divmod(node % cells, nx)
-            dx, dy = abs(x - gx), abs(y - gy)
+            x, y = self.place(node)
+            dx, dy = abs(x - gx) // GRID_um, abs(y - gy) // GRID_um
             return STEP * max(dx, dy) + (DIAGONAL - STEP) * min(dx, dy)
-
-        def price(node, kind=TRACK_um):
-            if self.fixed[kind][node] not in (0, net):
-                return FAR
-            return CROSS + self.met[node] if self.crowd[kind][node] > own[kind][node] else 0
 
         paid, came, done = dict.fromkeys(begin, 0), {}, set()
         heap = sorted((rest(node), node) for node in begin)
@@ -95,86 +84,74 @@ class Grid:
             if node in done:
                 continue
             done.add(node)
-            straight, here, other = node - came.get(node, node), price(node), (node + cells) % (2 * cells)
-            for step, length, dx, dy in [*self.steps, (other - node, THROUGH, 0, 0)]:
-                to, cost = node + step, paid[node] + length
-                if (min(node, to), max(node, to)) in edges:
-                    cost += 1 - length
-                elif to == other:
-                    cost += price(other) + (FAR if node % cells in too_near else price(node % cells, VIA_um))
-                else:
-                    cost += TURN * (step != straight) + price(to) + (price(node + dx) + price(node + dy) if dx and dy else here)
+            so_far, straight = paid[node], node - came.get(node, node)
+            for step, length, room in self.ways[node % 3]:
+                to, cost = node + step, so_far + length + TURN * (step != straight)
+                for at in room:
+                    cost += price[node + at]
                 if cost < paid.get(to, FAR):
                     paid[to], came[to] = cost, node
                     heapq.heappush(heap, (cost + rest(to), to))
-        raise wiring.Unwired(f"a pad of net {net} is walled in")
+        raise wiring.Unwired("a pad is walled in")
+
+    def joined(self, net, pads, others):
+        """The edges that join a net's pads [((x, y), nodes)], the nearest first. others: nodes that other nets' tracks take."""
+        price = [0 if owner in (0, net) else FAR for owner in self.fixed]
+        for node in others:
+            price[node] += CROSS + self.met[node]
+        pads = [(place, {node for node in nodes if price[node] < FAR}) for place, nodes in pads]
+        done, left, nodes, edges = pads[:1], pads[1:], set(pads[0][1]), set()
+        while left:
+            _, nearest = min((min(math.dist(place, other) for other, _ in done), i) for i, (place, _) in enumerate(left))
+            done.append(left.pop(nearest))
+            way = self.path(nodes, done[-1][1], price)
+            edges.update(way)
+            nodes.update(done[-1][1], *way)
+            for node in (a + step for a, b in way if b - a == BACK for step in self.apart):
+                price[node] = FAR
+        return edges
 
     def drawn(self, edges):
         """Tracks [(x0, y0, x1, y1, layer)] and vias [(x, y)] of a net."""
         tracks, vias = [], []
-        meet = collections.Counter(node for a, b in edges for node in (a, b) if b - a != self.cells)
+        meet = collections.Counter(node for a, b in edges for node in (a, b) if b - a != BACK)
         for a, b in sorted(edges):
             step = b - a
-            if step == self.cells:
+            if step == BACK:
                 vias.append(self.place(a))
             elif (a - step, a) not in edges or meet[a] > 2:
                 while (b, b + step) in edges and meet[b] == 2:
                     b += step
-                tracks.append((*self.place(a), *self.place(b), a // self.cells))
+                tracks.append((*self.place(a), *self.place(b), a % 3))
         return tracks, vias
-
-
-def whole(rectangle):
-    return [round(1000 * mm) for mm in rectangle]
-
-
-def tree(pads):
-    """The shortest [(length squared, begin, goal)] that join a net's pads [((x, y), nodes)]."""
-    joined, left, found = pads[:1], pads[1:], []
-    while left:
-        length, i, j = min(
-            ((a[0][0] - b[0][0]) ** 2 + (a[0][1] - b[0][1]) ** 2, i, j) for i, a in enumerate(joined) for j, b in enumerate(left)
-        )
-        found.append((length, joined[i][1], left[j][1]))
-        joined.append(left.pop(j))
-    return found
 
 
 def route(size, pads, free):
     """In mm. size: of the board; pads: [(net or None, layer (0 front, 1 back), x, y, w, h)]; free: [(layers without tracks, rectangle without vias)].
     Returns {net: (tracks [(x0, y0, x1, y1, layer)], vias [(x, y)])} in um."""
+    whole = lambda rectangle: [round(1000 * mm) for mm in rectangle]
     grid, (w, h) = Grid(*size), whole(mm / 2 for mm in size)
     for edge in ((-w, -h, w, -h), (-w, h, w, h), (-w, -h, -w, h), (w, -h, w, h)):
-        grid.fix(edge, (0, 1), TAKEN, EDGE_um)
+        grid.fix(edge, (FRONT, BACK, VIA), TAKEN, EDGE_um)
     for layers, rectangle in free:
-        grid.fix(whole(rectangle), layers, TAKEN)
+        grid.fix(whole(rectangle), (*layers, VIA), TAKEN)
     ends = {net: [] for net in sorted({pad[0] for pad in pads} - {None})}
     numbers = {None: TAKEN} | {net: n + 1 for n, net in enumerate(ends)}
-    boxes = [(net, layer, whole((x - w / 2, y - h / 2, x + w / 2, y + h / 2))) for net, layer, x, y, w, h in pads]
-    for net, layer, box in boxes:
+    for net, layer, x, y, w, h in pads:
+        box = whole((x - w / 2, y - h / 2, x + w / 2, y + h / 2))
         grid.fix(box, (layer,), numbers[net])
-        grid.fix(box, (), TAKEN, 0)  # a via in a pad takes its solder
-    for net, layer, box in boxes:
+        grid.fix(box, (VIA,), TAKEN, 0)  # it would take the pad's solder
         if net:
-            nodes = {layer * grid.cells + cell for cell in grid.near(box, 0)}
-            ends[net].append(((box[0] + box[2], box[1] + box[3]), {n for n in nodes if grid.fixed[TRACK_um][n] == numbers[net]}))
-    links = sorted((length, numbers[net], i, *link) for net in ends for i, (length, *link) in enumerate(tree(ends[net])))
-    waiting, laid, taken = [link[1:] for link in links], {}, {}
+            ends[net].append(((x, y), [3 * cell + layer for cell in grid.near(box, 0)]))
+    waiting, laid = sorted(ends, key=lambda net: len(ends[net])), {}
     for _ in range(ROUNDS):
         if not waiting:
-            return {net: grid.drawn({edge for link, way in laid.values() if link[0] == numbers[net] for edge in way}) for net in ends}
-        net, i, begin, goal = waiting[0]
-        keys = [key for key in laid if key[0] == net]
-        own = {kind: collections.Counter(node for key in keys for node in taken[key][kind]) for kind in grid.crowd}
-        way = grid.path(net, begin, goal, {edge for key in keys for edge in laid[key][1]}, own)
-        nodes, vias = {node for edge in way for node in edge}, {a for a, b in way if b - a == grid.cells}
-        laid[net, i], taken[net, i] = (waiting.pop(0), way), grid.takes(nodes, vias)
-        grid.count(taken[net, i], 1)
-        for key in [key for key in laid if key[0] != net]:
-            meets = nodes & taken[key][TRACK_um] | vias & taken[key][VIA_um]
-            for node in meets:
-                grid.met[node] += MET
-            if meets:
-                grid.count(taken.pop(key), -1)
-                waiting.append(laid.pop(key)[0])
-    raise wiring.Unwired(f"{len(waiting)} connections still cross others after {ROUNDS} rounds")
+            return {net: grid.drawn(laid[net][0]) for net in ends}
+        net = waiting.pop(0)
+        edges = grid.joined(numbers[net], ends[net], set().union(*(taken for _, taken in laid.values())))
+        needs, takes = grid.room_of(edges)
+        for other in [other for other, (_, taken) in laid.items() if needs & taken]:
+            grid.met.update({node: MET for node in needs & laid.pop(other)[1]})
+            waiting.append(other)
+        laid[net] = edges, takes
+    raise wiring.Unwired(f"{len(waiting)} nets still cross others after {ROUNDS} rounds")

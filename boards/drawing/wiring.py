@@ -3,6 +3,7 @@
 import dataclasses
 import math
 
+import geometry
 import pico
 import sheet
 
@@ -21,6 +22,7 @@ class Board:
     bus: str
     wiring: dict
     pull_ups_ohm: dict
+    pad: geometry.Pad
 
     @property
     def sensors(self):
@@ -41,8 +43,9 @@ class Board:
         return self.wiring["pin_mux_reset_0"] + strip
 
 
-def board_of(name, descriptor):
-    board = Board(name, descriptor["bus"], descriptor["wiring"], descriptor.get("pull_ups_ohm", {}))
+def board_of(name, descriptor, root=geometry.ROOT):
+    pad = geometry.pad(root / f"boards/pads/{descriptor['pad']}.json")
+    board = Board(name, descriptor["bus"], descriptor["wiring"], descriptor.get("pull_ups_ohm", {}), pad)
     if board.bus not in ("parallel", "multiplexed"):
         raise Unwired(f"boards/{name}/board.json: no drawing knows the bus {board.bus}; add one to boards/drawing/wiring.py")
     needed = ("sda", "scl") if board.bus == "parallel" else ("bus", "channel", "reset")
@@ -137,20 +140,20 @@ def table(board):
 def parts(board):
     """[(count, part of parts.json, what for)]."""
     ohm = board.pull_ups_ohm
-    found = [(1, "pico", ""), (board.sensors, "sensor", "")]
+    found = [(1, "Raspberry Pi Pico", ""), (board.sensors, board.pad.part, "")]
     if board.bus == "parallel":
-        found += [(board.sensors, ohm["sda"], "pull-up of each SDA"), (1, ohm["scl"], "pull-up of SCL")]
+        found += [(board.sensors, ohms(ohm["sda"]), "pull-up of each SDA"), (1, ohms(ohm["scl"]), "pull-up of SCL")]
         capacitors = board.sensors
     else:
         found += [
-            (board.strips, "multiplexer", ""),
-            (2, ohm["bus"], "pull-ups of SDA and SCL"),
-            (2 * board.sensors, ohm["channel"], "pull-ups of each channel"),
-            (board.strips, ohm["reset"], "pull-up of each RESET, which holds it while the Pico starts"),
+            (board.strips, "TCA9548A", ""),
+            (2, ohms(ohm["bus"]), "pull-ups of SDA and SCL"),
+            (2 * board.sensors, ohms(ohm["channel"]), "pull-ups of each channel"),
+            (board.strips, ohms(ohm["reset"]), "pull-up of each RESET, which holds it while the Pico starts"),
         ]
-        found += [(1, "connector", "only on a circuit board, as the next three"), (1, "housing", ""), (8, "contact", ""), (8, "wire", "")]
+        found += [(1, "JST SH 8", "only on a circuit board, as the next three"), (1, "housing", ""), (8, "contact", ""), (8, "wire", "")]
         capacitors = board.sensors + board.strips
-    return found + [(capacitors, "capacitor", "at each part's VDD")]
+    return found + [(capacitors, "100 nF", "at each part's VDD")]
 
 
 # The picture: its own units, not millimetres.
@@ -183,8 +186,11 @@ def node(x, y, kind="node"):
     return f'  <circle class="{kind}" cx="{x}" cy="{y}" r="2.3"/>'
 
 
-def sensor(x, y, k):
-    return [f'  <rect class="part" x="{x}" y="{y - 11}" width="{SENSOR_WIDTH}" height="22" rx="3"/>', text(x + 6, y + 4, f"MS5840 {k}")]
+def sensor(x, y, k, part):
+    return [
+        f'  <rect class="part" x="{x}" y="{y - 11}" width="{SENSOR_WIDTH}" height="22" rx="3"/>',
+        text(x + 6, y + 4, f"{part.partition('-')[0]} {k}"),
+    ]
 
 
 def gpio(y, number, right, label=""):
@@ -223,7 +229,7 @@ def drawn_parallel(board):
             node(pull_x, y),
             f'  <use href="#pullup" x="{pull_x}" y="{y}"/>',
         ]
-        lines += sensor(at_sensor, y, k) + [
+        lines += sensor(at_sensor, y, k, board.pad.part) + [
             path("scl", f"M{at_sensor + SENSOR_WIDTH} {y}H{scl_x}"),
             node(scl_x, y, "dot"),
             text(420, y - 6, f"SDA {k}", "small"),
@@ -301,7 +307,7 @@ def drawn_multiplexed(board):
                 text(mux_x + mux_width - 6, y + 4, f"SD{channel} SC{channel}", "small", end=True),
                 path("wire", f"M{mux_x + mux_width} {y - 3}H{at_sensor}"),
                 path("scl", f"M{mux_x + mux_width} {y + 3}H{at_sensor}"),
-                *sensor(at_sensor, y, k),
+                *sensor(at_sensor, y, k, board.pad.part),
             ]
     lines.append(text(34, sync_y + 40, f"each RESET also {ohms(ohm['reset'])} to 3V3", "small"))
     if "pin_sync" in w:

@@ -15,3 +15,4 @@ play_mm = 0.3;
 wall_mm = 5.0;
 rubber_mm = 12.0;
 flange_mm = 3.0;
+include <../mould.scad>

@@ -51,11 +51,11 @@ LIMITS = {
     "readme_words": (600, 600),
     "product_lines": (105000, 105000),
     "test_lines": (62000, 62000),
-    "grasp_lines": (11000, 11711),
+    "grasp_lines": (11000, 11709),
     "private_words": (60, 60),
     "unformatted_files": (0, 0),
     "longest_function_lines": (60, 60),
-    "board_lines": (900, 940),
+    "board_lines": (900, 938),
     "app_ifs": (1, 1),
 }
 APART = ("firmware/fit/", "firmware/condition/")  # from longest_file

@@ -5,6 +5,7 @@ usage: test_drawings.py HEADERS [unittest arguments]; HEADERS: folder where the 
 
 import contextlib
 import copy
+import dataclasses
 import io
 import json
 import pathlib
@@ -25,6 +26,7 @@ import wiring  # noqa: E402
 HEADERS = pathlib.Path(sys.argv[1])
 DESCRIPTORS = {path.parent.name: json.loads(path.read_text(encoding="utf-8")) for path in sorted(ROOT.glob("boards/*/board.json"))}
 PROJECT = f"cmake_minimum_required(VERSION 3.25)\nproject(boards NONE)\ninclude({ROOT}/cmake/boards.cmake)\n"
+OWN_PAD = geometry.pad(ROOT / "boards/pads/3x5.json")
 BY_BUS = {descriptor["bus"]: (name, descriptor) for name, descriptor in DESCRIPTORS.items()}
 
 
@@ -74,7 +76,7 @@ class Wiring(unittest.TestCase):
         board = wired("multiplexed", sensor_count=8, sensors_of_strip=4)
         self.assertEqual(board.strips, 2)
         self.assertEqual(wiring.drawn(board).count(">MS5840 "), 8)
-        self.assertEqual([count for count, part, _ in wiring.parts(board) if part in ("sensor", "multiplexer", "capacitor")], [8, 2, 10])
+        self.assertEqual([count for count, part, _ in wiring.parts(board) if part in ("MS5840-02BA", "TCA9548A", "100 nF")], [8, 2, 10])
 
     def test_what_it_refuses(self):
         for words, wires in (
@@ -124,22 +126,23 @@ class Wiring(unittest.TestCase):
                 self.assertIn(why, " ".join(done.stderr.split()))
 
     def test_numbers_of_resistors(self):
-        self.assertEqual([draw.yageo(ohm) for ohm in (33, 4.7, 1000, 2200, 3300, 10000)], ["33R", "4R7", "1K", "2K2", "3K3", "10K"])
+        self.assertEqual(
+            [draw.yageo(wiring.ohms(ohm)) for ohm in (33, 4.7, 1000, 2200, 3300, 10000)], ["33R", "4R7", "1K", "2K2", "3K3", "10K"]
+        )
 
 
 class Pad(unittest.TestCase):
     def test_the_measures_follow_the_places(self):
-        sensors = geometry.places()
-        m = mould.measures(sensors)
-        wider = mould.measures([(x * 2, y) for x, y in sensors])
-        reach = max(x for x, _ in sensors)
+        twice = dataclasses.replace(OWN_PAD, places=[(x * 2, y) for x, y in OWN_PAD.places])
+        m, wider = mould.measures(OWN_PAD), mould.measures(twice)
+        reach = max(x for x, _ in OWN_PAD.places)
         for name in ("skin", "flange", "outside", "opening"):
             self.assertAlmostEqual(getattr(wider, name)[0] - getattr(m, name)[0], 2 * reach)
             self.assertEqual(getattr(wider, name)[1], getattr(m, name)[1])
-        self.assertNotEqual(mould.drawn(sensors), mould.drawn([(x * 2, y) for x, y in sensors]))
+        self.assertNotEqual(mould.drawn(OWN_PAD), mould.drawn(twice))
 
     def test_nothing_is_where_a_screw_is(self):
-        m = mould.measures(geometry.places())
+        m = mould.measures(OWN_PAD)
         for x, y in m.screws:
             radius = mould.SCREW_mm / 2
             beside = [abs(at) - radius > flange / 2 + mould.FRAME_PLAY_mm for at, flange in zip((x, y), m.flange)]
@@ -173,9 +176,7 @@ class Tree(unittest.TestCase):
         source = self.tree / "boards/pads/3x5.json"
         source.write_text(source.read_text().replace('"pitch_mm": 9', '"pitch_mm": 9.5', 1))
         status, err = self.told("--check")
-        self.assertEqual(
-            [line.split()[0] for line in err.splitlines()], ["boards/mould_measures.scad", "boards/mould.svg", "boards/BUILD.md"]
-        )
+        self.assertEqual([line.split()[0] for line in err.splitlines()], ["boards/pads/3x5.scad", "boards/pads/3x5.svg", "boards/BUILD.md"])
 
     def test_a_page_without_a_place(self):
         page = self.tree / "boards/BUILD.md"
