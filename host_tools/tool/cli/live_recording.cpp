@@ -1,14 +1,18 @@
 #include "tool/cli/live_recording.hpp"
 
 #include "libfingertip/clock.hpp"
+#include "libfingertip/error.hpp"
+#include "libfingertip/text.hpp"
 #include "tool/cli/terminal.hpp"
 
+#include <cstdlib>
 #include <ctime>
 #include <utility>
 
 namespace fingertip {
 
-constexpr std::chrono::milliseconds WRITE_INTERVAL{20};
+constexpr std::chrono::milliseconds WRITE_INTERVAL{20}, LOOK_INTERVAL{100};
+constexpr std::chrono::seconds LONG{1};
 
 QueuedSink::QueuedSink(const std::string &path, bool overwrite)
     : QueuedSink(std::make_unique<OutputFile>(path, overwrite, OutputFile::Appears::at_once)) {}
@@ -19,6 +23,10 @@ QueuedSink::QueuedSink(std::unique_ptr<ByteSink> sink, std::size_t capacity_byte
 QueuedSink::~QueuedSink() {
   ends_ = true;
   wanted_.set();
+  if (is_given_up_) { /* the thread hangs in the kernel */
+    std::fprintf(stderr, "%s: took nothing; its last %zu bytes are lost\n", printable(path()).c_str(), queued_bytes_);
+    std::_Exit(1);
+  }
   thread_.join();
 }
 
@@ -35,12 +43,22 @@ void QueuedSink::finish() {
 }
 
 void QueuedSink::flush(std::size_t below_bytes) {
+  const HostTime long_after = host_now() + LONG;
+  std::optional<unsigned> interrupts_before; /* once the user knows that another one ends it */
   std::unique_lock<std::mutex> lock(mutex_);
   while (!failure_ && queued_bytes_ >= below_bytes) {
     lock.unlock();
     wanted_.set();
-    written_.wait(HostTime::max());
+    written_.wait(host_now() + LOOK_INTERVAL);
+    if (stop_requested() && !interrupts_before && host_now() > long_after) {
+      std::fprintf(stderr, "%s: takes nothing; waiting, Ctrl-C ends without the rest\n", printable(path()).c_str());
+      interrupts_before = interrupts();
+    }
     lock.lock();
+    if (interrupts_before && interrupts() > *interrupts_before) {
+      is_given_up_ = true;
+      failure_ = std::make_exception_ptr(Interrupted());
+    }
   }
   if (failure_) {
     std::rethrow_exception(failure_);

@@ -22,7 +22,8 @@ public:
   ~QueuedSink() override;
 
   void append(const void *bytes, std::size_t length) override;
-  /* Returns once fewer bytes wait: once everything is written. */
+  /* Returns once fewer bytes wait: once everything is written. If that takes more than a second after a signal, the next SIGINT throws
+   * Interrupted, and the destructor ends the program. */
   void flush(std::size_t below_bytes = 1);
   void finish() override;
   const std::string &path() const override { return sink_->path(); }
@@ -38,6 +39,7 @@ private:
   std::deque<std::string> queue_;
   std::size_t queued_bytes_ = 0;
   std::exception_ptr failure_;
+  bool is_given_up_ = false;
   Thread thread_;
 };
 

@@ -1,7 +1,9 @@
 #include "libfingertip/error.hpp"
 #include "support/host_packets.hpp"
 #include "tool/cli/live_recording.hpp"
+#include "tool/cli/terminal.hpp"
 
+#include <csignal>
 #include <gtest/gtest.h>
 
 using namespace fingertip;
@@ -16,7 +18,9 @@ struct DiskSink : ByteSink {
   explicit DiskSink(Disk &of) : disk(of) {}
   void append(const void *bytes, std::size_t length) override {
     const std::string text(static_cast<const char *>(bytes), length);
-    wait_until(host_now() + std::exchange(disk.stall, 0ms));
+    for (const HostTime until = host_now() + std::exchange(disk.stall, 0ms); host_now() < until;) {
+      wait_until(until); /* a signal ends it */
+    }
     if (text == disk.full_at) {
       throw Error("full");
     }
@@ -73,6 +77,20 @@ TEST(QueuedSink, AStalledDiskHoldsUpOnlyWhatItHasNoRoomFor) {
   EXPECT_GE(host_now(), before + 2s);
   sink.finish();
   EXPECT_EQ(disk.written.size(), 7 * second.size() + 3);
+}
+
+TEST(QueuedSink, ADiskThatHangsDoesNotKeepAnotherInterruptFromEndingIt) {
+  catch_signals();
+  static Disk disk = {1h, "-", ""};
+  auto *sink = new QueuedSink(std::make_unique<DiskSink>(disk)); /* its destructor would end this program */
+  append(*sink, "a");
+  kill(getpid(), SIGINT);
+  Thread user([until = host_now() + 3s] {
+    wait_until(until);
+    kill(getpid(), SIGINT);
+  });
+  EXPECT_THROW(sink->finish(), Interrupted);
+  user.join();
 }
 
 TEST(LiveRecording, BeginsOnlyWithItsHeadOnTheDisk) {
