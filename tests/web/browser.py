@@ -27,31 +27,7 @@ FLAGS = """
 --disable-breakpad --disable-dev-shm-usage --mute-audio --hide-scrollbars --force-color-profile=srgb
 --force-device-scale-factor=1
 """.split()
-FAINT = """(() => {
-  const paint = new OffscreenCanvas(1, 1).getContext('2d', {willReadFrequently: true});
-  const parts = colour => {
-    paint.clearRect(0, 0, 1, 1);
-    paint.fillStyle = colour;
-    paint.fillRect(0, 0, 1, 1);
-    const [r, g, b, a] = paint.getImageData(0, 0, 1, 1).data;
-    return [r, g, b, a / 255];
-  };
-  const over = (top, under) => top.slice(0, 3).map((c, i) => c * top[3] + under[i] * (1 - top[3]));
-  const luminance = rgb => rgb.map(c => c / 255).map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)
-    .reduce((sum, c, i) => sum + c * [0.2126, 0.7152, 0.0722][i], 0);
-  const behind = element => element ? over(parts(getComputedStyle(element).backgroundColor), behind(element.parentElement)) : [255, 255, 255];
-  const found = [];
-  for (const element of document.body.querySelectorAll('*')) {
-    const text = [...element.childNodes].filter(node => node.nodeType === 3).map(node => node.data).join('').trim();
-    const style = getComputedStyle(element);
-    if (!text || !element.checkVisibility({opacityProperty: true, visibilityProperty: true}) || element.matches(':disabled')) continue;
-    const under = behind(element), [dark, light] = [luminance(under), luminance(over(parts(style.color), under))].sort((a, b) => a - b);
-    const contrast = (light + 0.05) / (dark + 0.05), size_px = parseFloat(style.fontSize);
-    const large = size_px >= 24 || (size_px >= 18.66 && style.fontWeight >= 700);
-    if (contrast < (large ? 3 : 4.5)) found.push([text, contrast]);
-  }
-  return found;
-})()"""
+AXE = pathlib.Path(__file__).resolve().parents[2] / "host_tools/web/node_modules/axe-core/axe.min.js"
 START = 'mount --bind "$1" "$2" && shift 2 && exec "$@" 3<&"$FROM_TEST" 4>&"$TO_TEST"'
 
 
@@ -355,9 +331,10 @@ class Page:
         found = self.call("Runtime.evaluate", expression=f"document.querySelector({json.dumps(selector)})")["result"]
         self.call("DOM.setFileInputFiles", files=[str(pathlib.Path(path).resolve()) for path in paths], objectId=found["objectId"])
 
-    def faint(self):
-        """(text, contrast) of what is shown with less contrast to the colours that lie behind it than WCAG 2.1 asks for (1.4.3, level AA)."""
-        return [tuple(found) for found in self.run(FAINT)]
+    def violations(self):
+        """What axe-core finds that keeps people out: a rule and an element each."""
+        self.run(f"{AXE.read_text(encoding='utf-8')}; 0")
+        return self.run("axe.run().then(({violations}) => violations.flatMap(({id, nodes}) => nodes.map(each => `${id}: ${each.target}`)))")
 
     def foreign(self):
         """Addresses asked for, or refused by its policy, that are not of the page's own origin."""

@@ -27,6 +27,8 @@ const TIMES_px = 22;
 const LEAST_PLOT_px = 44;
 /** Of one event of the wheel at most; that of a pinch on a touchpad is less. */
 const ZOOM = 1.25;
+/** Of two fingers that are above one another. */
+const LEAST_APART_px = 40;
 /** From one tick to the next. */
 const TICK_px = 24;
 const MOST_PLOT_px = 240;
@@ -57,7 +59,7 @@ interface Drawn {
 }
 
 export class Traces {
-  readonly element = element('div', { class: 'traces', title: 'Ctrl with the wheel, + and −, or drawing over a part zoom in time' });
+  readonly element = element('div', { class: 'traces', title: 'Zoom: Ctrl with the wheel, two fingers, + and −, or draw over a part' });
   private readonly buckets = new Buckets(2 * MOST_INTERVALS);
   private readonly strip = element('canvas', { class: 'flags', role: 'img' });
   private drawn: Drawn[] = [];
@@ -93,6 +95,17 @@ export class Traces {
       }
     };
     this.element.addEventListener('wheel', wheel, { passive: false });
+    let apart_px = 0;
+    const pinch = ({ touches: [one, other] }: TouchEvent) => {
+      const before_px = apart_px;
+      apart_px = one && other ? Math.max(Math.abs(one.clientX - other.clientX), LEAST_APART_px) : 0;
+      if (before_px && apart_px) {
+        this.onZoom?.(before_px / apart_px);
+      }
+    };
+    for (const type of ['touchstart', 'touchmove', 'touchend', 'touchcancel'] as const) {
+      this.element.addEventListener(type, pinch, { passive: true });
+    }
   }
 
   setPalette(palette: Palette): void {
