@@ -21,10 +21,7 @@ KINDS = (
     ("holds several", "several"),
     ("no fingertip", "no such"),
     ("format .* is unknown", "other format"),
-    (
-        r":1: no recording|no recording of a fingertip|no MCAP file|packed as|UTF-16|spreadsheet|mcap (?:compress|filter|recover)",
-        "no recording",
-    ),
+    (r":1: no recording|no recording of a fingertip|no MCAP file|packed as|UTF-16|mcap [a-z]+ FILE", "no recording"),
     (r":\d+: |damaged|torn|no header line|missing", "damaged"),
 )
 
@@ -61,12 +58,9 @@ def info_of(metadata):
         return " ".join(str(int(word)) if re.fullmatch("-?[0-9]+", word) else shortest(float(word)) for word in text.split())
 
     stored = int(metadata.get("stored", "0"))
-    known = {
-        key
-        for key in KNOWN_KEYS
-        if not ((key.startswith(("calibration_", "force_scale")) or key in SENSOR_LISTS) and not stored & 1)
-        and not (key.startswith("pad_") and not stored & 16)
-    }
+    of_calibration = {key for key in KNOWN_KEYS if key.startswith(("calibration_", "force_scale")) or key in SENSOR_LISTS}
+    of_pad = {key for key in KNOWN_KEYS if key.startswith("pad_")}
+    known = set(KNOWN_KEYS) - (set() if stored & 1 else of_calibration) - (set() if stored & 16 else of_pad)
     nothing = {"serial": "", "board": "", "scene": "", "git": "", "firmware": "0.0.0"}
     found = []
     for key in filter(known.__contains__, KNOWN_KEYS):

@@ -6,6 +6,7 @@ A job is {"name", "kind": "recording" | "stream" | "setting", "input": path or t
 
 import bz2
 import gzip
+import io
 import lzma
 import pathlib
 import random
@@ -165,12 +166,12 @@ def csv_cases(corpus, name, text, devices):
     lines = lines_of(text)
     header, row = header_at(lines), full_row_at(lines)
 
-    def add(what, content):
-        corpus.recording(f"{name}_{what}", content if isinstance(content, bytes) else text_of(content), devices=devices)
+    def add(what, content, same=""):
+        corpus.recording(f"{name}_{what}", content if isinstance(content, bytes) else text_of(content), devices=devices, rows_of=same)
 
     add("whole", text)
-    add("crlf", text.replace(b"\n", b"\r\n"))
-    add("crcrlf", text.replace(b"\n", b"\r\r\n"))
+    for what, end in {"crlf": b"\r\n", "crcrlf": b"\r\r\n", "cr_only": b"\r"}.items():
+        add(what, text.replace(b"\n", end), f"{name}_whole")
     add("no_end_line", lines[:-1])
     add("no_line_end", text[:-1])
     for cut in (1, 20, len(lines[row])):
@@ -179,10 +180,11 @@ def csv_cases(corpus, name, text, devices):
     add("blank_lines", [*lines[:row], "", " \t", *lines[row:]])
     add("blank_line_first", ["", *lines])
     add("byte_order_mark", b"\xef\xbb\xbf" + text)
-    for what, cell in {"semicolons": "{};", "tabs": "{}\t", "quotes": '"{}",', "decimal_commas": "{},"}.items():
-        cells = [line.replace(".", "," if "comma" in what else ".").split(",") for line in lines]
-        add(what, [line if line[0] == "#" else "".join(map(cell.format, each))[:-1] for line, each in zip(lines, cells)])
-    add("cr_only", text.replace(b"\n", b"\r"))
+    for what, cell in {"semicolons": "{};", "tabs": "{}\t", "quotes": '"{}",', "blanks": " {} ,", "decimal_commas": "{};"}.items():
+        rows = [[each.replace(".", "," if "comma" in what else ".") for each in line.split(",")] for line in lines]
+        filled = [f'"{line}"' + 9 * cell[-1] if "q" in what else line + 9 * cell[-1] for line in lines]
+        add(what, [fill if "#" in fill else "".join(map(cell.format, row)) for fill, row in zip(filled, rows)], f"{name}_whole")
+    add("twice", text + text)
     add("note", [*lines[:row], "# 12:30 object placed", "#", *lines[row:]])
     add("no_info_packet", [line for line in lines if "packet: info" not in line])
     add("rows_twice", [*lines[: row + 1], *lines[row:]])
@@ -330,15 +332,19 @@ def cases_by_others(corpus, name, bag, devices):
         "topics_only": {"only": "/(contact|wrench|place|pressures)$|diagnostics"},
         "topics_only_no_chunks": {"only": "/(contact|wrench|place|pressures)$", "use_chunking": False},
         "topics_packed": {"only": "contact|pressures", "pack": zstandard.compress},
+        "topics_backwards": {"only": "contact|pressures", "order": lambda found: found[::-1], "chunk_size": 1, "enable_crcs": False},
         "contacts_alone": {"only": "contact"},
         "channels_late": {"order": lambda found: sorted(found, key=lambda each: "lines" in each[1].topic), "chunk_size": 1000},
         "others_alone": {"only": "wrench|place|diagnostics"},
         "lines_alone": {"only": "lines"},
     }.items():
         data = rewritten(corpus, bag, **how)
-        is_whole = "alone" not in what and (name == "one_bag" or "topics" not in what)
+        is_whole = not re.search("alone|topics_back", what) and (name == "one_bag" or "topics" not in what)
         corpus.recording(f"{name}_{what}", data, "mcap", devices, f"{name}_whole", is_whole)
         corpus.recording(f"{name}_{what}_cut", data[: len(data) * 2 // 3], "mcap", devices, f"{name}_whole", False)
+        if what == "topics_backwards":  # an index that lacks a chunk
+            at = data.rindex(struct.pack("<Q", make_reader(io.BytesIO(data)).get_summary().chunk_indexes[9].chunk_start_offset)) - 25
+            corpus.recording(f"{name}_unlisted", data[:at] + b"\x7f" + data[at + 1 :], "mcap", devices, f"{name}_whole", False)
     for pack in (zstandard.compress, gzip.compress, lz4.frame.compress, bz2.compress, lzma.compress):
         corpus.recording(f"{name}_packed_as_a_whole_by_{pack.__module__.split('.')[0]}", pack(bag.read_bytes()), "mcap", devices)
 
@@ -369,20 +375,15 @@ def part_cases(corpus, text, convert):
 def messages_of(path):
     """[(schema's name, message)] of lines and contacts."""
     with open(path, "rb") as file:
-        found = [
-            (schema.name.replace("/msg/", "/"), message.data)
-            for schema, _, message in make_reader(file).iter_messages(log_time_order=False)
-        ]
+        read = make_reader(file).iter_messages(log_time_order=False)
+        found = [(schema.name.replace("/msg/", "/"), message.data) for schema, _, message in read]
     return [(name, decode(name, data)) for name, data in found if name in (LINE_TYPE, CONTACT_TYPE)]
 
 
 def message_cases(corpus, name, bag, devices):
     messages = messages_of(bag)
-    where = [
-        at
-        for at, (kind, row) in enumerate(messages)
-        if kind == CONTACT_TYPE and row["has_contact"] and row["has_raw"] and row["flags"] & 2 and row["device"] == 0
-    ]
+    full = [at for at, (kind, row) in enumerate(messages) if kind == CONTACT_TYPE and row["has_contact"] and row["has_raw"]]
+    where = [at for at in full if messages[at][1]["flags"] & 2 and messages[at][1]["device"] == 0]
     at = where[0] if where else next(at for at, (kind, row) in enumerate(messages) if kind == CONTACT_TYPE)
     scratch = corpus.folder / "scratch.mcap"
 
@@ -414,11 +415,9 @@ def message_cases(corpus, name, bag, devices):
         "t_us": (2**53,),
     }
     changes = [{name: value} for name, each in values.items() for value in each]
-    changes += [{"flags": 0, "x_mm": x_mm} for x_mm in (nan, 3.5)]
-    changes += [{"x_mm": nan, "y_mm": nan, "force_n": nan}, {"has_contact": False, "has_raw": False}]
-    changes += [
-        {"pressure_pa": each, "tare_pa": each} for each in (pressures[:-1], [*pressures, 0.0], 33 * [0.0], [])
-    ]  # other numbers of sensors
+    changes += [{"flags": 0, "x_mm": nan}, {"flags": 0, "x_mm": 3.5}, {"x_mm": nan, "y_mm": nan, "force_n": nan}]
+    counts = (pressures[:-1], [*pressures, 0.0], 33 * [0.0], [])  # other numbers of sensors
+    changes += [{"has_contact": False, "has_raw": False}, *({"pressure_pa": each, "tare_pa": each} for each in counts)]
     for number, change in enumerate(changes):
         add(f"message_{'_'.join(change)}_{number}", lambda kind, row, change=change: [(kind, {**row, **change})])
     good = encode(CONTACT_TYPE, row)
@@ -471,7 +470,8 @@ def bag_cases(corpus, name, content, devices, chances):
             add(f"chunk_{number}_field_{field}", content[:at] + data + content[at + len(data) :])
     add("magic_only", content[:8])
     add("half_a_magic", content[:5])
-    add("bytes_behind", content + b"hello")
+    for behind in (b"hello", content):
+        add(f"{len(behind)}_bytes_behind", content + behind)
     add("no_footer", content[: chunks[-1].chunk_start_offset + chunks[-1].chunk_length + chunks[-1].message_index_length])
     prng = random.Random(name)
     for chance in range(chances):

@@ -45,23 +45,14 @@ def of_library(answer, who):
 def is_of_decompressors(name, library, answer):
     """A flipped bit that the library's zstd or lz4 decodes to the very same and other decoders refuse, which judge checksums: Debian has zstd 1.5.4, PyPI
     1.5.7, the page fzstd. answer: without salvage."""
-    whole = library.get(re.sub(r"_chance_\d+ ", "_whole ", name))
-    return (
-        "_chance_" in name
-        and library[name] == whole
-        and re.search("decompression error|cannot be unpacked|LZ4F_", answer.get("text", "")) is not None
-    )
+    is_same = library[name] == library.get(re.sub(r"_chance_\d+ ", "_whole ", name))
+    return "_chance_" in name and is_same and re.search("decompression error|cannot be unpacked|LZ4F_", answer.get("text", "")) is not None
 
 
 def agree(one, other):
     """The page tells of no events."""
-    return (
-        one == other
-        or isinstance(one, dict)
-        and isinstance(other, dict)
-        and {**one, **other} == one
-        and one.keys() - other.keys() <= {"events"}
-    )
+    are_answers = isinstance(one, dict) and isinstance(other, dict)
+    return one == other or (are_answers and {**one, **other} == one and one.keys() - other.keys() <= {"events"})
 
 
 def lost(jobs, found):

@@ -298,7 +298,6 @@ bool Reader::next(Message &message) {
   if (!has_index_) {
     read_index();
     has_index_ = true;
-    next_ = first_;
   }
   while (at_message_ == messages_.size()) {
     if (!read_record()) {
@@ -341,7 +340,6 @@ void Reader::read_index() {
   if (crc != 0 && crc != crc_of(all.substr(0, all.size() - 4))) {
     return;
   }
-  std::map<std::uint64_t, std::uint64_t> begins_ns; /* by their places in the file */
   try {
     for (Fields records(all); !records.rest().empty();) {
       const auto opcode = records.get<std::uint8_t>();
@@ -350,14 +348,17 @@ void Reader::read_index() {
       if (opcode == SCHEMA || opcode == CHANNEL) {
         judge(opcode, content, 1);
       } else if (opcode == CHUNK_INDEX) {
-        const auto begin_ns = fields.get<std::uint64_t>(), end_ns = fields.get<std::uint64_t>();
-        const auto at = std::min(fields.get<std::uint64_t>(), *summary_);
+        const auto begin_ns = fields.get<std::uint64_t>();
+        fields.get<std::uint64_t>(); /* the end */
+        const auto at = fields.get<std::uint64_t>();
         fields.get<std::uint64_t>(); /* the length */
-        Span &span = spans_[static_cast<std::streamoff>(at)] = {begin_ns, end_ns, {}};
+        if (at >= *summary_) {
+          throw Damage("a chunk behind all");
+        }
+        Span &span = spans_[static_cast<std::streamoff>(at)] = {begin_ns, {}};
         for (Fields channels(fields.text()); !channels.rest().empty(); channels.get<std::uint64_t>()) {
           span.channels.push_back(channels.get<std::uint16_t>());
         }
-        begins_ns[at] = begin_ns;
       }
     }
   } catch (const Damage &) {
@@ -366,18 +367,21 @@ void Reader::read_index() {
     spans_.clear();
     return;
   }
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> by_time;
-  for (const auto &[at, begin_ns] : begins_ns) {
-    by_time.emplace_back(begin_ns, at);
+  std::vector<std::pair<std::uint64_t, std::streamoff>> by_time;
+  std::vector<std::streamoff> ends; /* of what is read in a row: from a chunk to the next one in the file */
+  for (const auto &[at, span] : spans_) {
+    by_time.emplace_back(span.begin_ns, at);
+    ends.push_back(at);
   }
+  ends.push_back(static_cast<std::streamoff>(*summary_));
   if (std::is_sorted(by_time.begin(), by_time.end())) {
     return;
   }
   std::sort(by_time.begin(), by_time.end());
-  first_ = static_cast<std::streamoff>(by_time[0].second);
-  for (std::size_t i = 0; i < by_time.size(); i++) {
-    order_[static_cast<std::streamoff>(by_time[i].second)] =
-        static_cast<std::streamoff>(i + 1 < by_time.size() ? by_time[i + 1].second : *summary_);
+  by_time.emplace_back(0, ends.back());
+  after_[ends[0]] = by_time[0].second;
+  for (std::size_t i = 0; i + 1 < by_time.size(); i++) {
+    after_[*std::upper_bound(ends.begin(), ends.end(), by_time[i].second)] = by_time[i + 1].second;
   }
 }
 
@@ -390,17 +394,17 @@ void Reader::want(std::uint64_t from_ns, std::uint64_t to_ns, IsNeeded is_needed
 /* The chunk that is read. */
 bool Reader::is_left_out() const {
   const auto found = spans_.find(record_);
-  return is_needed_ && found != spans_.end() && (found->second.end_ns < from_ns_ || found->second.begin_ns > to_ns_) &&
+  if (!is_needed_ || found == spans_.end()) {
+    return false;
+  }
+  char own[2 * sizeof(std::uint64_t)]; /* its times, where the index is wrong */
+  const bool has_own = bytes_->read(static_cast<std::uint64_t>(record_) + RECORD_HEAD_BYTES, own, sizeof own) == sizeof own;
+  const std::string_view times(own, sizeof own);
+  return has_own && (number_at<std::uint64_t>(times, sizeof own / 2) < from_ns_ || number_at<std::uint64_t>(times, 0) > to_ns_) &&
          std::none_of(found->second.channels.begin(), found->second.channels.end(), [&](std::uint16_t id) {
            const auto channel = channels_.find(id);
            return channel == channels_.end() || is_needed_(channel->second.topic, channel->second.type);
          });
-}
-
-/* Of the record that is read, which ends there: where to read on. */
-std::streamoff Reader::after(std::streamoff end) const {
-  const auto found = order_.find(record_);
-  return found == order_.end() ? end : found->second;
 }
 
 /* False at the end. Changes nothing where the source throws. */
@@ -415,39 +419,53 @@ bool Reader::read_record() {
   const std::uint64_t size = bytes_->size(), left = size > at ? size - at : 0;
   char head[RECORD_HEAD_BYTES];
   if (left < sizeof head || bytes_->read(at, head, sizeof head) < sizeof head) {
-    torn_ = left > 0; /* a killed writer leaves whole chunks */
+    torn_ = left > 0 && !is_behind_; /* a killed writer leaves whole chunks */
     ended_ = true;
     return false;
   }
   auto opcode = static_cast<std::uint8_t>(head[0]);
   auto length = number_at<std::uint64_t>({head, sizeof head}, 1);
   if (length > left - sizeof head) {
-    torn_ = ended_ = true;
-    return false;
-  }
-  const auto next = after(record_ + static_cast<std::streamoff>(sizeof head + length));
-  if (opcode == DATA_END || (!order_.empty() && at >= *summary_)) {
-    next_ = next;
+    torn_ = !is_behind_;
     ended_ = true;
     return false;
   }
-  if (opcode != SCHEMA && opcode != CHANNEL && opcode != MESSAGE && opcode != CHUNK) {
+  const auto end = record_ + static_cast<std::streamoff>(sizeof head + length);
+  if (opcode == FOOTER && is_behind_) {
+    char behind[2 * sizeof MAGIC];
+    const bool is_whole = bytes_->read(static_cast<std::uint64_t>(end), behind, sizeof behind) == sizeof behind;
+    ended_ = true;
+    if (is_whole && std::equal(std::begin(MAGIC), std::end(MAGIC), behind + sizeof MAGIC)) {
+      const auto begin = static_cast<std::uint64_t>(end) + sizeof MAGIC;
+      throw Damage("byte " + std::to_string(begin) + ": another MCAP file begins; head -c " + std::to_string(begin) + " and tail -c +" +
+                   std::to_string(begin + 1) + " take them apart");
+    }
+    return false;
+  }
+  const auto summary = static_cast<std::streamoff>(summary_.value_or(0));
+  const auto jump = after_.find(opcode == DATA_END ? summary : end);
+  const auto next = jump == after_.end() ? end : jump->second;
+  const auto go_on = [&] {
     next_ = next;
+    is_behind_ = is_behind_ || (after_.empty() ? opcode == DATA_END : next == summary);
+  };
+  if (is_behind_ || (opcode != SCHEMA && opcode != CHANNEL && opcode != MESSAGE && opcode != CHUNK)) {
+    go_on();
     return true;
   }
   if (opcode == CHUNK && is_left_out()) {
     has_left_out_ = true;
-    next_ = next;
+    go_on();
     return true;
   }
   if (length > RECORD_MOST_bytes) {
-    next_ = next;
+    go_on();
     record_ = next;
     throw Damage("byte " + std::to_string(at) + ": a record of " + std::to_string(length) + " bytes");
   }
   std::string content(length, '\0');
   const bool whole = bytes_->read(at + sizeof head, content.data(), content.size()) == length;
-  next_ = next;
+  go_on();
   try {
     if (!whole) {
       throw Damage("it cannot be read");
@@ -512,8 +530,8 @@ void Reader::read_chunk(std::string_view content) {
 }
 
 void Reader::go_to(const Place &place) {
-  next_ = place.offset == sizeof MAGIC ? first_ : place.offset;
-  ended_ = torn_ = false;
+  next_ = place.offset;
+  ended_ = torn_ = is_behind_ = false;
   messages_.clear();
   at_message_ = 0;
   if (place.message > 0) {

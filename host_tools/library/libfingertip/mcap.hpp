@@ -121,7 +121,6 @@ private:
   void read_chunk(std::string_view content);
   bool read_record();
   void read_index();
-  std::streamoff after(std::streamoff end) const;
   bool is_left_out() const;
 
   std::unique_ptr<ByteSource> bytes_;
@@ -133,16 +132,16 @@ private:
   bool ended_ = false;
   bool has_index_ = false;                         /* it was read, if there is one */
   std::optional<std::uint64_t> summary_;           /* where it begins, once that is known; 0: there is none */
-  std::map<std::streamoff, std::streamoff> order_; /* of chunks: the one after each by time; empty: as in the file */
+  bool is_behind_ = false;                         /* behind the data */
+  std::map<std::streamoff, std::streamoff> after_; /* from a chunk's place to that of another, by time; empty: as in the file */
   struct Span {
-    std::uint64_t begin_ns, end_ns;
+    std::uint64_t begin_ns;
     std::vector<std::uint16_t> channels;
   };
   std::map<std::streamoff, Span> spans_; /* of chunks, by the index */
   std::uint64_t from_ns_ = 0, to_ns_ = UINT64_MAX;
   IsNeeded is_needed_;
   bool has_left_out_ = false;
-  std::streamoff first_ = sizeof MAGIC;          /* of them */
   std::map<std::uint16_t, std::string> schemas_; /* their names */
   std::map<std::uint16_t, Channel> channels_;
 };

@@ -238,7 +238,7 @@ void McapLineSink::begin() {
 }
 
 void McapLineSink::put(const std::string &text, bool torn) {
-  if (!torn && has_rows_ && !text.empty() && text[0] != '#' && put_row(text)) {
+  if (!torn && text[0] != '#' && !trim(text).empty() && put_row(text)) {
     return;
   }
   put_line(text, torn);
@@ -297,6 +297,9 @@ bool McapLineSink::put_row(const std::string &text) {
   ros::Row row;
   std::string_view cells = text;
   try {
+    if (!has_rows_) {
+      throw Damage{"unknown header"};
+    }
     if (joint_) {
       auto device = to_u64(cells.substr(0, cells.find(',')));
       cells.remove_prefix(std::min(cells.find(','), cells.size() - 1) + 1);
@@ -311,7 +314,7 @@ bool McapLineSink::put_row(const std::string &text) {
     row.contact = packets.contact;
     row.raw = packets.raw;
   } catch (const Damage &damage) {
-    unread_ = unread_count_++ ? unread_ : std::to_string(number_ + 1) + ": " + damage.what;
+    unread_ = unread_count_++ ? unread_ : std::to_string(number_ + 1) + ": " + damage.text();
     return false;
   }
   row.number = ++number_;
@@ -418,7 +421,10 @@ void McapLineSource::take(mcap::Reader::Message message) {
     waiting_.emplace(number, std::move(message));
   } else if (!is_contact) {
     throw Error(ErrorCode::unread_kind, path_ + ": chunks in another order than that of time, and no index: mcap recover FILE -o OUT");
+  } else if (message.time_ns < latest_ns_) {
+    throw Error(ErrorCode::unread_kind, path_ + ": messages in another order than that of time: mcap sort FILE -o OUT");
   } else if (message.topic == topic_) {
+    latest_ns_ = message.time_ns;
     waiting_.emplace(number_ + waiting_.size() + 1, std::move(message));
   } else {
     throw Error(ErrorCode::unread_kind, path_ + ": topics of several fingertips, and no lines of a recording. Take one: " +
@@ -495,6 +501,7 @@ void McapLineSource::go_to(const Place &place) {
   number_ = place.number;
   waiting_ = std::any_cast<Waiting>(place.waiting);
   is_ended_ = reported_torn_ = false;
+  latest_ns_ = 0;
 }
 
 } // namespace fingertip

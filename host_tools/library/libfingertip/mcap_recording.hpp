@@ -110,8 +110,9 @@ private:
   std::string path_;
   mcap::Reader reader_;
   std::uint64_t number_ = 0;
-  Waiting waiting_;   /* by their numbers, for those before them */
-  std::string topic_; /* of contacts in a file without lines, whose numbers are counted here */
+  Waiting waiting_;             /* by their numbers, for those before them */
+  std::string topic_;           /* of contacts in a file without lines, whose numbers are counted here */
+  std::uint64_t latest_ns_ = 0; /* log time of them */
   bool is_ended_ = false;
   TimeSpan wanted_s_;
   std::optional<std::uint64_t> begin_ns_; /* of the first line */

@@ -69,6 +69,8 @@ struct PairWriter {
 /* What is wrong with a line, without its place. */
 struct Damage {
   std::string what;
+  /* For a message: the begin of it. */
+  std::string text() const { return what.size() > 200 ? what.substr(0, 200) + "..." : what; }
 };
 
 template <typename Integer> Integer checked(std::int64_t value, const std::string &name) {
@@ -81,7 +83,12 @@ template <typename Integer> Integer checked(std::int64_t value, const std::strin
 
 template <typename Value> void parse_cell(const std::string &name, std::string_view cell, Value &&value) {
   using Plain = std::decay_t<Value>;
-  std::string wrong = name + " is \"" + std::string(cell) + "\"";
+  const auto found = [&](const auto &number) {
+    if (!number) {
+      throw Damage{name + " is \"" + std::string(cell) + "\""};
+    }
+    return *number;
+  };
   if constexpr (std::is_same_v<Plain, Quantity>) {
     if (cell.empty() && !value.valid) {
       value.value = 0;
@@ -89,29 +96,17 @@ template <typename Value> void parse_cell(const std::string &name, std::string_v
     }
     parse_cell(name, cell, value.value);
   } else if constexpr (std::is_same_v<Plain, float>) {
-    auto number = to_float(cell);
-    if (!number) {
-      throw Damage{wrong};
-    }
-    value = *number;
+    value = found(to_float(cell));
   } else if constexpr (std::is_same_v<Plain, std::uint64_t>) {
-    auto number = to_u64(cell);
-    if (!number) {
-      throw Damage{wrong};
-    }
-    value = *number;
+    value = found(to_u64(cell));
   } else if constexpr (std::is_integral_v<Plain>) {
-    auto number = to_i64(cell);
-    if (!number) {
-      throw Damage{wrong};
-    }
-    value = checked<Plain>(*number, name);
+    value = checked<Plain>(found(to_i64(cell)), name);
   } else {
     auto number = to_double(cell);
-    if (!number || std::fabs(*number) > 1e12) {
-      throw Damage{wrong};
+    if (number && std::fabs(*number) > 1e12) {
+      number.reset();
     }
-    value.raw = checked<std::decay_t<decltype(value.raw)>>(std::llround(*number * value.scale), name);
+    value.raw = checked<std::decay_t<decltype(value.raw)>>(std::llround(found(number) * value.scale), name);
   }
 }
 
@@ -183,7 +178,9 @@ inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, in
   std::size_t contact_count = contact_columns(sets);
   std::size_t raw_count = RAW_COLUMNS + 2 * std::size_t{sensor_count};
   if (cells.size() != 2 + contact_count + raw_count) {
-    throw Damage{std::to_string(cells.size()) + " columns where the header has " + std::to_string(2 + contact_count + raw_count)};
+    const std::size_t columns = 2 + contact_count + raw_count;
+    throw Damage{std::to_string(cells.size()) + " columns where the header has " + std::to_string(columns) +
+                 (cells.size() > columns ? "; decimal commas, or more cells?" : "")};
   }
   auto is_empty = [&](std::size_t from, std::size_t count) {
     return std::all_of(cells.begin() + static_cast<std::ptrdiff_t>(from), cells.begin() + static_cast<std::ptrdiff_t>(from + count),

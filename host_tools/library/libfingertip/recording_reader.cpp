@@ -18,6 +18,50 @@ namespace {
 
 constexpr std::string_view OUR_FILES = "# fingertip-";
 
+/* Makes of a line what it was before a spreadsheet saved it: between semicolons, tabs or commas, with quotes, blanks and decimal commas,
+ * and filled up with empty cells. */
+class Spreadsheet {
+public:
+  void restore(LineSource::Line &line) {
+    std::string &text = line.text;
+    const std::size_t filled = text.find_last_not_of(",;\t") + 1;
+    fill_ = line.number == 1 ? text.substr(filled, filled < text.size()) : fill_;
+    const bool is_quoted = text.rfind("\"#", 0) == 0;
+    if (is_quoted || text.rfind('#', 0) == 0) {
+      text.erase(fill_.empty() ? text.size() : text.find_last_not_of(fill_) + 1);
+      text = is_quoted ? text.substr(1, text.size() - 1 - (text.back() == '"')) : text;
+      for (std::size_t at = 0; is_quoted && (at = text.find("\"\"", at)) != std::string::npos; at++) {
+        text.erase(at, 1);
+      }
+    } else if (!trim(text).empty() && (commas_ < 0 || is_one_)) {
+      const std::size_t separator = text.find_first_of(";\t");
+      separator_ = commas_ < 0 && separator != std::string::npos ? text[separator] : separator_;
+      std::string plain;
+      bool is_within = false; /* quotes */
+      for (const char c : text) {
+        is_within = is_within != (c == '"');
+        const bool ends_cell = c == separator_ && !is_within;
+        if (ends_cell || (c != '"' && c != ' ' && c != '\t')) {
+          plain += ends_cell ? ',' : c == ',' ? '.' : c;
+        }
+      }
+      const auto commas = [&] { return std::count(plain.begin(), plain.end(), ','); };
+      while (!plain.empty() && plain.back() == ',' && (commas() > commas_ || plain.find_first_not_of(',') == std::string::npos)) {
+        plain.pop_back();
+      }
+      is_one_ = is_one_ || plain != text;
+      commas_ = commas_ < 0 ? commas() : commas_;
+      text = plain;
+    }
+  }
+
+private:
+  std::string fill_;           /* what ends the first line */
+  char separator_ = ',';       /* between the header's cells */
+  std::ptrdiff_t commas_ = -1; /* of the header, once it was there */
+  bool is_one_ = false;
+};
+
 /* A mark before the first line, and ends by CR LF or CR alone, which editors write, are no part of them. */
 class TextLines : public LineSource {
 public:
@@ -51,6 +95,7 @@ public:
     if (number_ == 1 && line.text.rfind(BYTE_ORDER_MARK, 0) == 0) {
       line.text.erase(0, BYTE_ORDER_MARK.size());
     }
+    spreadsheet_.restore(line);
     return is_there;
   }
   Place place() override { return {static_cast<std::streamoff>(begin_ + at_), 0, number_}; }
@@ -70,6 +115,7 @@ private:
   std::size_t at_ = 0;
   std::uint64_t number_ = 0;
   char end_ = '\n';
+  Spreadsheet spreadsheet_;
 };
 
 /* See within. */
@@ -180,6 +226,7 @@ std::string format_of(const std::string &path, const std::string &line) {
 
 /* Throws Error for a file that may hold a recording, with what makes one of it that is read. */
 void refuse_others(const std::string &path, std::string_view start) {
+  constexpr const char *UTF_16 = "text in UTF-16, an editor's or a spreadsheet's; save it as UTF-8";
   constexpr std::pair<std::string_view, const char *> OTHERS[] = {
       {"\x28\xb5\x2f\xfd", "packed as a whole by zstd: unzstd FILE"},
       {"\x04\x22\x4d\x18", "packed as a whole by lz4: unlz4 FILE"},
@@ -188,9 +235,11 @@ void refuse_others(const std::string &path, std::string_view start) {
       {"\xfd"
        "7zXZ",
        "packed as a whole by xz: unxz FILE"},
-      {"PK\3\4", "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV, with commas alone"},
+      {"PK\3\4", "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV"},
       {"SQLite format 3", "a bag of ROS 2 in SQLite; ros2 bag convert makes one in MCAP, packed as it is now"},
-      {std::string_view("\xff\xfe#", 3), "text in UTF-16, a spreadsheet's? Save it as UTF-8"},
+      {"\xff\xfe", UTF_16},
+      {"\xfe\xff", UTF_16},
+      {std::string_view("#\0", 2), UTF_16},
   };
   for (const auto &[begin, what] : OTHERS) {
     if (start.substr(0, begin.size()) == begin) {
@@ -313,7 +362,7 @@ bool RecordingReader::read_next() {
     }
     read_line(line.text);
   } catch (const Damage &damage) {
-    damaged(place() + damage.what, 1);
+    damaged(place() + damage.text(), 1);
   }
   return true;
 }
@@ -342,10 +391,6 @@ void RecordingReader::read_line(const std::string &text) {
   } else {
     const auto columns = columns_of(text, joint_);
     if (!columns || (joint_ && devices_.empty())) {
-      if (text.find_first_of(";\t\"") != std::string::npos) {
-        throw Error(ErrorCode::unread_kind,
-                    path_ + ": cells between semicolons or tabs, or in quotes: a spreadsheet's? Save it with commas alone");
-      }
       throw Damage{"unknown header"};
     }
     sensor_count_ = columns->sensor_count;
@@ -368,6 +413,9 @@ std::optional<std::uint32_t> RecordingReader::device_of(std::string_view number)
 }
 
 void RecordingReader::read_comment(const std::string &text) {
+  if (text.rfind(FIRST_WORDS, 0) == 0) {
+    throw Damage{"another recording begins; take the file apart there"};
+  }
   std::size_t colon = text.find(": ");
   if (colon == std::string::npos) {
     return; /* a person's note */
@@ -481,14 +529,15 @@ void RecordingReader::read_end(std::string_view text) {
 }
 
 void RecordingReader::read_info_field(wire_info &info, const std::string &key, const std::string &value) {
-  auto copy_text = [&](char *field) {
-    if (!std::all_of(value.begin(), value.end(), [](char c) { return c >= 0x20 && c <= 0x7E; })) {
-      throw Damage{key + " is no printable ASCII"};
-    }
-    std::memset(field, 0, WIRE_TEXT_BYTES);
-    std::memcpy(field, value.data(), std::min<std::size_t>(value.size(), WIRE_TEXT_BYTES));
+  bool known = false;
+  const auto is = [&](const std::string &name) {
+    known = known || name == key;
+    return name == key;
   };
-  auto read_list = [&](auto value_of, std::size_t most = FT_MAX_SENSORS) {
+  const auto read_list = [&](const std::string &name, std::size_t most, const auto &value_of) {
+    if (!is(name)) {
+      return;
+    }
     auto numbers = split(value, ' ');
     if (numbers.size() > most) {
       throw Damage{key + " has too many values"};
@@ -503,12 +552,15 @@ void RecordingReader::read_info_field(wire_info &info, const std::string &key, c
   const std::pair<const char *, char *> texts[] = {
       {"serial", info.serial}, {"board", info.board}, {"scene", info.scene}, {"git", info.git_hash}};
   for (const auto &[name, field] : texts) {
-    if (key == name) {
-      copy_text(field);
-      return;
+    if (is(name)) {
+      if (!std::all_of(value.begin(), value.end(), [](char c) { return c >= 0x20 && c <= 0x7E; })) {
+        throw Damage{key + " is no printable ASCII"};
+      }
+      std::memset(field, 0, WIRE_TEXT_BYTES);
+      std::memcpy(field, value.data(), std::min<std::size_t>(value.size(), WIRE_TEXT_BYTES));
     }
   }
-  if (key == "firmware") {
+  if (is("firmware")) {
     auto parts = split(value, '.');
     if (parts.size() != 3) {
       throw Damage{"firmware is \"" + value + "\""};
@@ -516,37 +568,27 @@ void RecordingReader::read_info_field(wire_info &info, const std::string &key, c
     for (std::size_t i = 0; i < 3; i++) {
       parse_cell(key, parts[i], info.firmware_version[i]);
     }
-  } else if (key == "x_mm") {
-    read_list([&](std::size_t k) -> float & { return info.x_mm[k]; });
-  } else if (key == "y_mm") {
-    read_list([&](std::size_t k) -> float & { return info.y_mm[k]; });
-  } else {
-    bool known = false;
-    auto visit_list = [&](const char *name, auto member) {
-      if (key == name) {
-        known = true;
-        read_list([&](std::size_t k) -> auto & { return info.calibration.sensors[k].*member; });
-      }
-    };
-    visit_sensor_lists(visit_list);
-    for (const PadList &each : pad_lists) {
-      if (key == each.name) {
-        known = true;
-        read_list([&](std::size_t j) -> float & { return each.value(info.pad, j); }, each.terms);
-      }
+  }
+  read_list("x_mm", FT_MAX_SENSORS, [&](std::size_t k) -> float & { return info.x_mm[k]; });
+  read_list("y_mm", FT_MAX_SENSORS, [&](std::size_t k) -> float & { return info.y_mm[k]; });
+  const auto visit_list = [&](const char *name, auto member) {
+    read_list(
+        name, FT_MAX_SENSORS, [&](std::size_t k) -> auto & { return info.calibration.sensors[k].*member; });
+  };
+  visit_sensor_lists(visit_list);
+  for (const PadList &each : pad_lists) {
+    read_list(each.name, each.terms, [&](std::size_t j) -> float & { return each.value(info.pad, j); });
+  }
+  const auto visit = [&](const std::string &name, auto &field) {
+    if (is(name)) {
+      parse_cell(name, value, field);
     }
-    auto visit = [&](const std::string &name, auto &field) {
-      if (name == key) {
-        known = true;
-        parse_cell(name, value, field);
-      }
-    };
-    visit_info(visit, info);
-    visit_calibration(visit, info.calibration);
-    visit_pad(visit, info.pad);
-    if (!known && !state_.header_seen) {
-      recorder_metadata_.emplace_back(key, value);
-    }
+  };
+  visit_info(visit, info);
+  visit_calibration(visit, info.calibration);
+  visit_pad(visit, info.pad);
+  if (!known && !state_.header_seen) {
+    recorder_metadata_.emplace_back(key, value);
   }
 }
 

@@ -32,10 +32,7 @@ public:
     bytes_ += '\0';
   }
   void put(const char *text) { put(std::string_view(text)); }
-  template <typename First, typename Second, typename... More> void put(const First &first, const Second &second, const More &...more) {
-    put(first);
-    put(second, more...);
-  }
+  template <typename... Values> std::enable_if_t<(sizeof...(Values) > 1)> put(const Values &...values) { (put(values), ...); }
   void count(std::size_t elements) { put(static_cast<std::uint32_t>(elements)); }
 
   const std::string &bytes() const { return bytes_; }
@@ -76,10 +73,7 @@ public:
     at_ += good_ ? length : 0;
   }
 
-  template <typename First, typename Second, typename... More> void get(First &first, Second &second, More &...more) {
-    get(first);
-    get(second, more...);
-  }
+  template <typename... Values> std::enable_if_t<(sizeof...(Values) > 1)> get(Values &...values) { (get(values), ...); }
 
   bool is_good() const { return good_; }
 

@@ -31,7 +31,7 @@ from .errors import InputError
 from .frames import Edge, frame_of
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
 from .mcap_recording import MAGIC, Contacts, Damaged, Line, LogClock, McapLineReader, Skipped
-from .recorded import Array, Rows, counts_of, judge_key, packet_of
+from .recorded import OF_SPREADSHEETS, Array, Rows, counts_of, judge_key, packet_of, restored
 
 if TYPE_CHECKING:
     import pandas
@@ -300,6 +300,7 @@ class Recording:
 # Some 20 MB are read in a second: below this the wait is short.
 WORTH_WAITING_bytes = 10_000_000
 LATE_s = 1.0  # a row may come behind later ones by less than this
+HEAD_MOST_bytes = 1_000_000  # of a recording that an editor or a spreadsheet has saved
 BLOCK_bytes, ROWS_AT_ONCE = 500_000, 1024  # about the same; more take no less time each
 JOINT_COLUMNS = "device,time_us,"
 
@@ -311,9 +312,9 @@ _OTHERS = {
     b"\x1f\x8b\x08": "packed as a whole by gzip: gunzip FILE",
     b"BZh": "packed as a whole by bzip2: bunzip2 FILE",
     b"\xfd7zXZ": "packed as a whole by xz: unxz FILE",
-    b"PK\3\4": "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV, with commas alone",
+    b"PK\3\4": "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV",
     b"SQLite format 3": "a bag of ROS 2 in SQLite; ros2 bag convert makes one in MCAP, packed as it is now",
-    b"\xff\xfe#": "text in UTF-16, a spreadsheet's? Save it as UTF-8",
+    **dict.fromkeys((b"\xff\xfe", b"\xfe\xff", b"#\0"), "text in UTF-16, an editor's or a spreadsheet's; save it as UTF-8"),
 }
 
 
@@ -346,7 +347,7 @@ class _RecordingLines:
         """The same, but rows, or what else is neither comment nor blank, many at a time."""
         try:
             with open(self.path, "rb") as file:
-                start = file.read(16384)
+                start = file.read(HEAD_MOST_bytes)
                 if start.startswith(MAGIC):
                     self.mcap = McapLineReader(self.path, self.progress, self.interval_s)
                     yield from self.mcap.items()
@@ -355,7 +356,10 @@ class _RecordingLines:
                     if start.startswith(magic):
                         raise InputError(f"{self.path}: {what}")
                 file.seek(3 if start.startswith(b"\xef\xbb\xbf") else 0)
-                source: Any = file if b"\n" in start or b"\r" not in start else io.BytesIO(file.read().replace(b"\r", b"\n"))
+                source: Any = file
+                if (b"\r" in start and b"\n" not in start) or OF_SPREADSHEETS.search(start):
+                    texts = file.read().decode("utf-8", "surrogateescape").split("\n" if b"\n" in start else "\r")
+                    source = io.BytesIO("\n".join(restored(texts)).encode("utf-8", "surrogateescape"))
                 size, read, shown, number = os.fstat(file.fileno()).st_size, 0, 0, 1
                 while lines := source.readlines(BLOCK_bytes):
                     block = b"".join(lines)
@@ -442,17 +446,11 @@ class _Reading:
                 self.waits.append((number, cells[2], recorded.number("time_us", cells[1])))
 
     def _header(self, text: str) -> None:
-        wrong = "wrong header; record again with this version of fingertip"
-        if any(c in text for c in ';\t"'):
-            wrong = "cells between semicolons or tabs, or in quotes: a spreadsheet's? Save it with commas alone"
         if self.is_joint:
             if not text.startswith(JOINT_COLUMNS) or self.number is None:
-                raise ValueError(wrong)
+                raise ValueError("unknown header")
             text = text.removeprefix(JOINT_COLUMNS)
-        try:
-            self.rows = Rows(text)
-        except ValueError:
-            raise ValueError(wrong) from None
+        self.rows = Rows(text)
         self.clock = LogClock(self.metadata)
         names = self.rows.names
         self.wanted = (
@@ -515,6 +513,8 @@ class _Reading:
         self.times_us.extend(times_us)
 
     def _comment(self, line: int, text: str) -> None:
+        if text.startswith("# fingertip-recording "):
+            raise ValueError("another recording begins; take the file apart there")
         key, separator, value = text[1:].partition(": ")
         if not separator:
             return  # a person's note
@@ -529,7 +529,7 @@ class _Reading:
         elif self.is_joint and key == "packet":
             raise ValueError("a packet without a fingertip's number")
         elif self.is_joint and key == "devices":
-            self.number = _choose_device(self.path, value.split(), self.serial)
+            self.number, self.has_info, self.info_sensors = _choose_device(self.path, value.split(), self.serial), False, 0
         if key == "end":
             counts = dict(pair.split("=", 1) for pair in value.split(" ") if "=" in pair) if self.is_joint else counts_of(value)
             self.end = {**counts, **self.own_end}
@@ -583,7 +583,8 @@ def read_recording(
         skipped += lost
 
     def wrong(number: int, error: ValueError) -> None:
-        damaged(InputError(f"{path}:{number}: {error}" + ("; use --salvage to skip damaged lines" if reading.rows else "")), 1)
+        what = str(error) if len(str(error)) <= 200 else f"{str(error)[:200]}..."
+        damaged(InputError(f"{path}:{number}: {what}" + ("; use --salvage to skip damaged lines" if reading.rows else "")), 1)
 
     def one(number: int, text: str, torn: bool) -> None:
         if text.startswith("#") or len(reading.waits) >= ROWS_AT_ONCE:

@@ -36,7 +36,7 @@ PERIOD_ns = 10_000_000  # each has the wrench, location and pressures of one row
 CHUNK_MOST_bytes = 1 << 28  # of one that is read
 MESSAGE_MOST_bytes = 1 << 20  # of one that is packed by itself
 WAITING_MOST = 1 << 16  # lines that wait for one before them, before it counts as lost
-_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 3, 4, 5, 6, 15  # opcodes
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 2, 3, 4, 5, 6, 15  # opcodes
 _PERIODIC = re.compile("# (?:[0-9]+/)?(?:clock: |grip: |packet: health )")  # lines that each second or more has
 _ZSTD = b"\x28\xb5\x2f\xfd"
 
@@ -344,7 +344,7 @@ class McapLineReader:
         self._channels: dict[int, tuple[str, str]] = {}  # topic, name of the schema
         self._is_joint: bool | None = None
         self._topic: str | None = None  # of contacts in a file without lines, whose numbers are counted here
-        self._count = 0
+        self._count = self._latest_ns = 0
         self._has_header = self._is_torn = self._has_any = False
 
     def _damaged(self, topic: str, error: ValueError) -> Damaged:
@@ -398,24 +398,37 @@ class McapLineReader:
             for are_contacts, group in itertools.groupby(ready, lambda single: isinstance(single, Contacts)):
                 yield from [Contacts(*(list(itertools.chain(*parts)) for parts in zip(*group)))] if are_contacts else group
 
-    def _index(self, file: BinaryIO) -> list[tuple[int, int, int]]:
-        """A sound index has all channels, and of each chunk when it begins, its place, when it ends, in order of time."""
+    def _index(self, file: BinaryIO) -> tuple[dict[int, int], int]:
+        """A sound index has all channels, and when each chunk begins, by its place. And where the summary begins."""
         file.seek(0)
         try:
             summary = self._mcap.reader.make_reader(file).get_summary()
+            file.seek(-len(MAGIC) - 20, os.SEEK_END)
+            (begin,) = struct.unpack("<Q", file.read(8))
         except (self._mcap.exceptions.McapError, ValueError, MemoryError, OSError, struct.error):
             summary = None
-        if summary is None:
-            return []
+        if summary is None or any(each.chunk_start_offset >= begin for each in summary.chunk_indexes):
+            return {}, 0
         self._schemas = {each.id: each.name.replace("/msg/", "/") for each in summary.schemas.values()}
         self._channels = {each.id: (each.topic, self._schemas.get(each.schema_id, "")) for each in summary.channels.values()}
-        return sorted((each.message_start_time, each.chunk_start_offset, each.message_end_time) for each in summary.chunk_indexes)
+        return {each.chunk_start_offset: each.message_start_time for each in summary.chunk_indexes}, begin
 
-    def _is_outside(self, begin_ns: int, end_ns: int) -> bool:
-        """Of the interval."""
-        if self._interval_s is None or self._begin_ns is None or not self._has_header:
+    @staticmethod
+    def _jumps(spans: dict[int, int], summary: int) -> dict[int, int]:
+        """From a chunk's place, or the summary, to that of another, by time; none where the file is in that order. What no index has is read
+        behind the chunk before it."""
+        places, order = sorted(spans), sorted(spans, key=lambda place: (spans[place], place))
+        if places == order:
+            return {}
+        next_in_file, next_by_time = (dict(zip(each, [*each[1:], summary])) for each in (places, order))
+        return {places[0]: order[0], **{next_in_file[place]: next_by_time[place] for place in places}}
+
+    def _is_outside(self, chunk: bytes) -> bool:
+        """Of the interval, by its own times, where the index is wrong."""
+        if self._interval_s is None or self._begin_ns is None or not self._has_header or len(chunk) < 16:
             return False
-        return (end_ns - self._begin_ns) / 1e9 < self._interval_s[0] or (begin_ns - self._begin_ns) / 1e9 > self._interval_s[1]
+        begin_ns, end_ns = struct.unpack("<QQ", chunk)
+        return bool((end_ns - self._begin_ns) / 1e9 < self._interval_s[0] or (begin_ns - self._begin_ns) / 1e9 > self._interval_s[1])
 
     def _records(self) -> Iterator[Line | Contacts | Damaged | Skipped]:
         """What is in the file, in its order, or that of its chunks by time."""
@@ -426,27 +439,30 @@ class McapLineReader:
                 size = os.fstat(file.fileno()).st_size
                 if file.read(len(MAGIC)) != MAGIC:
                     raise InputError(f"{self.path}: no MCAP file; give one that fingertip has written")
-                index = self._index(file)
-                order = [place for _, place, _ in index]
-                spans = {place: (begin_ns, end_ns) for begin_ns, place, end_ns in index}
-                order = order if order != sorted(order) else []
-                follows = dict(zip(order, [*order[1:], size]))
-                is_skipping = False
-                at = file.seek(order[0] if order else len(MAGIC))
+                spans, summary = self._index(file)
+                after = self._jumps(spans, summary)
+                is_skipping = is_behind = False
+                at = file.seek(len(MAGIC))
                 while at < size:  # a killed writer leaves whole chunks
                     head = file.read(9)
                     length = int.from_bytes(head[1:], "little")
                     if len(head) < 9 or length > size - at - 9:
-                        self._is_torn = True
-                        return
-                    if head[0] == _DATA_END:
+                        self._is_torn = not is_behind
+                        break
+                    if head[0] == _FOOTER and is_behind:
+                        file.seek(at + 9 + length + len(MAGIC))
+                        if file.read(len(MAGIC)) == MAGIC:
+                            begin = at + 9 + length + len(MAGIC)
+                            apart = f"head -c {begin} and tail -c +{begin + 1} take them apart"
+                            yield Damaged(f"{self.path}: damaged at byte {begin}: another MCAP file begins; {apart}")
                         break
                     if self._progress:
                         self._progress(at / size)
-                    is_outside = at in spans and self._is_outside(*spans[at])
+                    is_outside = head[0] == _CHUNK and at in spans and self._is_outside(file.read(16))
+                    file.seek(at + 9)
                     is_skipping = is_skipping or is_outside
                     try:
-                        if is_outside:
+                        if is_outside or is_behind:
                             pass
                         elif head[0] == _CHUNK and length <= CHUNK_MOST_bytes:
                             found = self._messages(self._chunk(file.read(length)))
@@ -460,8 +476,10 @@ class McapLineReader:
                     except damage as error:
                         what = "it ends within a field" if isinstance(error, struct_error) else error
                         yield Damaged(f"{self.path}: damaged at byte {at} ({what}); use --salvage to skip the chunk")
-                    at = file.seek(follows.get(at, at + 9 + length))
-                if self._topic:
+                    end = at + 9 + length
+                    at = file.seek(after.get(summary if head[0] == _DATA_END else end, end))
+                    is_behind = is_behind or (at == summary if after else head[0] == _DATA_END)
+                if self._topic and not self._is_torn:
                     yield self._count + 1, "# end: reason=topics", False
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
@@ -531,6 +549,9 @@ class McapLineReader:
         rows: list[bytes] = []
         times_s: list[float] = []
         for name, topic, message, time_ns in wanted:
+            if self._topic and name == CONTACT_TYPE and time_ns < self._latest_ns:
+                raise InputError(f"{self.path}: messages in another order than that of time: mcap sort FILE -o OUT")
+            self._latest_ns = time_ns
             if name == CONTACT_TYPE and (number := self._number_of(message, topic)) is not None:
                 numbers.append(number)
                 topics.append(topic)

@@ -4,7 +4,7 @@ import io
 import math
 import operator
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -43,6 +43,30 @@ _PACKETS = {
     for kind, body in (("health", Health), ("ack", Acknowledgement), ("sync", SyncEdge))
 }
 _PACKETS["info"] = {"sequence": "H", "t_us": "Q"}
+
+
+# A first line, or a header, as spreadsheets save it.
+OF_SPREADSHEETS = re.compile(rb'\A(?:\xef\xbb\xbf)?(?:"|[^\r\n]*[;,\t][\r\n])|^"?(?:t_us|device)(?:[^\r\n]*[;\t" ]|[^\r\n]*,[\r\n])', re.M)
+
+
+def restored(lines: Iterable[str]) -> Iterator[str]:
+    """Lines as they were before a spreadsheet saved them: between semicolons, tabs or commas, with quotes, blanks and decimal commas, and filled
+    up with empty cells."""
+    fill, separator, commas = None, ",", -1
+    for text in (line.rstrip("\r") for line in lines):
+        fill = text[len(text.rstrip(",;\t")) :][:1] if fill is None else fill
+        if text.startswith(("#", '"#')):
+            text = text.rstrip(fill) if fill else text
+            text = text[1:].removesuffix('"').replace('""', '"') if text[0] == '"' else text
+        elif text.strip(" \t\r"):
+            separator = next((c for c in text if c in ";\t"), ",") if commas < 0 else separator
+            parts = text.split('"')
+            parts[::2] = [part.replace(separator, "\n") for part in parts[::2]]  # outside of quotes
+            text = re.sub("[ \t]", "", "".join(parts)).replace(",", ".").replace("\n", ",")
+            while text.endswith(",") and (text.count(",") > commas or not text.strip(",")):
+                text = text[:-1]
+            commas = text.count(",") if commas < 0 else commas
+        yield text
 
 
 def whole(name: str, cell: str, code: str) -> int:
@@ -139,7 +163,7 @@ class Rows:
         pressures = (f"{kind}{k}_Pa" for kind in ("s", "tare") for k in range(self.sensors))
         self.names = ["t_us", "frame", *CONTACT_COLUMNS, *there, *RAW_COLUMNS, *pressures]
         if header != ",".join(self.names) or self.sensors > SENSORS_MAX:
-            raise ValueError("wrong header")
+            raise ValueError("unknown header")
         wires = {"sequence": Wire("H"), **dict(layout_of(Contact))}
         contact = [wires[name] for name in self.names[2 : self._first_raw]]
         self._codes = ["Q", "I", *(wire.code for wire in contact), "H", "I", "I", "I", "I", "h", *"i" * 2 * self.sensors]
@@ -244,7 +268,8 @@ class Rows:
         """A row's cells as numbers, NaN where they are empty. Raises ValueError where libfingertip finds no row in it."""
         cells = text.split(",")
         if len(cells) != len(self.names):
-            raise ValueError(f"{len(cells)} columns where the header has {len(self.names)}")
+            cause = "; decimal commas, or more cells?" if len(cells) > len(self.names) else ""
+            raise ValueError(f"{len(cells)} columns where the header has {len(self.names)}{cause}")
         first_raw = self._first_raw
         has_contact, has_raw = any(cells[2:first_raw]), any(cells[first_raw:])
         if not has_contact and not has_raw:

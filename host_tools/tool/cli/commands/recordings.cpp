@@ -73,6 +73,11 @@ void check_paths(const Conversion &conversion) {
   check_output(conversion.to, conversion.overwrite);
 }
 
+Error no_frames(const std::string &path, const TimeSpan &interval) {
+  return Error(path + (interval.is_all() ? ": no frames in it; give a recording or capture of a streaming fingertip"
+                                         : ": no frames from --from to --to; give a part that has some"));
+}
+
 /* The facts of a file that is read for them once. */
 struct Contents {
   std::optional<wire_info> info; /* the first */
@@ -105,7 +110,7 @@ Contents contents_of(const Conversion &conversion) {
   }
   contents.recorder = file.recorder_metadata();
   if (contents.frames == 0) {
-    throw Error(conversion.from + ": no frames in it; give one of a streaming fingertip");
+    throw no_frames(conversion.from, conversion.interval);
   }
   return contents;
 }
@@ -211,7 +216,7 @@ void convert_lines(const Conversion &conversion) {
     report_damage(unread); /* they are kept as text */
   }
   if (!conversion.interval.is_all() && rows < 2) {
-    throw Error(conversion.from + ": no frames from --from to --to; give a part that has some");
+    throw no_frames(conversion.from, conversion.interval);
   }
   sink->finish();
   report_cut_short(conversion.from, !is_ended);
@@ -310,7 +315,7 @@ int show(const ReplayOptions &options) {
     const FingertipTrack &track = playback.tracks()[i];
     const Model &model = playback.models()[i];
     if (model.frames() == 0 && track.is_ended()) {
-      throw Error(options.file + ": no frames in it; give a recording or capture of a streaming fingertip");
+      throw no_frames(options.file, options.interval);
     }
     report_losses(options.file, track.file());
     bool several = playback.tracks().size() > 1;
