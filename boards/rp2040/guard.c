@@ -16,12 +16,10 @@
 #define MPU_RASR_BYTES(log2) (((log2)-1u) << 1)
 #define MPU_RASR_ENABLE (1u << 0)
 
-/* From the start of SRAM up to __code_end: vectors, code and constants. Each region covers eighths
- * of its size, and the next one, of the size of an eighth, what is left. */
-static void guard_code(void) {
-  extern const uint32_t __image_start[], __code_end[];
+/* From the start of SRAM. Each region covers eighths of its size, and the next one, of the size of an eighth, what is left. */
+static void guard_writes(uint32_t end) {
+  extern const uint32_t __image_start[];
   uint32_t at = (uint32_t)(uintptr_t)__image_start;
-  uint32_t end = (uint32_t)(uintptr_t)__code_end;
   uint32_t region = 2;
   for (uint32_t log2 = 18; log2 >= 9; log2 -= 3) {
     uint32_t eighths = (end - at) >> (log2 - 3);
@@ -37,12 +35,12 @@ void guard_end(void) {
   __asm volatile("dsb\n isb" ::: "memory");
 }
 
-void guard_memory(const uint32_t *stack_guard, uint32_t log2_bytes) {
+void guard_memory(const uint32_t *stack_guard, uint32_t log2_bytes, const void *writable) {
   MPU_RBAR = (uint32_t)(uintptr_t)stack_guard | MPU_RBAR_REGION(0u);
   MPU_RASR = MPU_RASR_NO_ACCESS | MPU_RASR_BYTES(log2_bytes) | MPU_RASR_ENABLE;
   MPU_RBAR = MPU_RBAR_REGION(1u);
   MPU_RASR = MPU_RASR_NO_ACCESS | MPU_RASR_BYTES(8u) | MPU_RASR_ENABLE;
-  guard_code();
+  guard_writes((uint32_t)(uintptr_t)writable);
   MPU_CTRL = MPU_CTRL_DEFAULT_MAP | MPU_CTRL_ENABLE;
   __asm volatile("dsb\n isb" ::: "memory");
 }

@@ -140,9 +140,9 @@ static void read_serial_number(void) {
 }
 
 void port_start(void) {
-  extern const uint32_t __stack_guard[];
+  extern const uint32_t __stack_guard[], __code_end[];
   crash_start();
-  guard_memory(__stack_guard, 12u);
+  guard_memory(__stack_guard, 12u, __code_end);
   rp2040_irq_set_priorities();
   if (resets_release(RESETS_TIMER) != FT_OK)
     port_panic();

@@ -24,7 +24,7 @@ extern const uint32_t __second_stack_guard[], __vectors[];
 static void send_event(void) { __asm volatile("sev" ::: "memory"); }
 
 static _Noreturn void run(void) {
-  guard_memory(__second_stack_guard, 8u);
+  guard_memory(__second_stack_guard, 8u, work.context); /* what is before it is the first one's */
   SCB_SCR = SCB_SCR_SLEEPDEEP;
   for (;;) {
     while (work.serve(work.context))

@@ -47,10 +47,10 @@ struct app {
   struct commands commands;
   struct second second;
   struct findings found; /* of the frame under way */
-  struct stages stages;
   struct line line;
   struct store store;
   struct scan scan;
+  struct stages stages; /* its end is the second processor's */
 };
 
 /* Starts the pipeline on this bus, which must outlive it. Attaches to USB. */

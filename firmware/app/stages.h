@@ -33,12 +33,7 @@ struct stages {
   struct contact_settings contact_settings; /* the force scale, and what the user has set of slip */
 #endif
 #if FT_WITH_TANGENTIAL
-  struct jobs jobs;
-  struct tangential_stage tangential;
   struct motion_history motion;
-#endif
-#if FT_WITH_SHAPES
-  struct shapes_stage shapes;
 #endif
 #if FT_WITH_SLIP
   struct slip_history slip;
@@ -48,6 +43,13 @@ struct stages {
 #endif
 #if FT_WITH_SYNC
   struct sync sync;
+#endif
+#if FT_WITH_TANGENTIAL
+  struct jobs jobs; /* the second processor writes to it and to what follows only (port.h) */
+  struct tangential_stage tangential;
+#if FT_WITH_SHAPES
+  struct shapes_stage shapes;
+#endif
 #endif
 };
 

@@ -42,7 +42,8 @@ void port_at(enum crash_activity activity);
 void port_event(enum crash_event event, uint8_t detail);
 
 /* A second processor that shares the memory: from now on it calls serve(context) whenever it is woken, until that returns false. Whatever
- * it did before has ended. False: there is none, or it does not start. Takes some 20 us. Main context only. */
+ * it did before has ended. False: there is none, or it does not start. Takes some 20 us. It writes
+ * to what is before context at no time: there it may fault. Main context only. */
 bool port_worker_start(bool (*serve)(void *context), void *context);
 
 /* Wakes it; port_sleep() returns once it has served. */

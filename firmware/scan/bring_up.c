@@ -2,23 +2,21 @@
 
 #include <string.h>
 
-/* Factor of the time that an admission of all sensors took, for which the next one waits. */
-#define REST 20u
-/* After one that left a sensor out, or that was for a suspect; then doubled. */
-#define INTERVAL_MIN_us 1000000u
+/* From one admission to the next, doubled while they follow each other. Supplies that dip once do so again. While a sensor is left out: */
+#define INTERVAL_us 16000u
+#define INTERVAL_LEFT_OUT_us 1000000u
 #define INTERVAL_MAX_us 8000000u
 #define PASSES 3
 
 void bring_up_init(struct bring_up *bring_up, uint8_t sensor_count) {
   memset(bring_up, 0, sizeof *bring_up);
   bring_up->sensor_count = sensor_count;
-  bring_up->interval_us = INTERVAL_MIN_us;
 }
 
 void bring_up_begin(struct bring_up *bring_up, bool of_suspects, uint64_t now_us) {
   bring_up->of_suspects = of_suspects;
+  bring_up->interval_us = (uint32_t)(now_us - bring_up->began_us) > 2 * INTERVAL_MAX_us ? 0 : bring_up->interval_us;
   bring_up->began_us = now_us;
-  bring_up->next_us = now_us + bring_up->interval_us;
   bring_up->pass = 0;
   bring_up->word = 0;
   bring_up->heard = 0;
@@ -78,7 +76,7 @@ bool bring_up_take_word(struct bring_up *bring_up, const struct array_bus_result
   return true;
 }
 
-struct bring_up_result bring_up_end(struct bring_up *bring_up, uint64_t now_us) {
+struct bring_up_result bring_up_end(struct bring_up *bring_up) {
   for (uint8_t k = 0; k < bring_up->sensor_count; k++) {
     if (bring_up->differs >> k & 1u) {
       use_prom(bring_up, k);
@@ -86,11 +84,10 @@ struct bring_up_result bring_up_end(struct bring_up *bring_up, uint64_t now_us) 
   }
   const sensor_map admitted = bring_up->good | bring_up->differs;
   bring_up->rechecks = bring_up->differs == 0 ? 0 : (uint8_t)(bring_up->rechecks + (bring_up->rechecks <= BRING_UP_RECHECKS));
-  if (admitted == first_sensors(bring_up->sensor_count) && !bring_up->of_suspects && !bring_up_wants_recheck(bring_up)) {
-    bring_up->next_us = now_us + REST * (now_us - bring_up->began_us);
-    bring_up->interval_us = INTERVAL_MIN_us;
-  } else if (bring_up->interval_us < INTERVAL_MAX_us) {
-    bring_up->interval_us *= 2;
-  }
+  const bool all = admitted == first_sensors(bring_up->sensor_count) && !bring_up_wants_recheck(bring_up);
+  const uint32_t least_us = all ? INTERVAL_us : INTERVAL_LEFT_OUT_us, twice_us = 2 * bring_up->interval_us;
+  const uint32_t most_us = all && !bring_up->of_suspects ? INTERVAL_LEFT_OUT_us : INTERVAL_MAX_us;
+  bring_up->interval_us = twice_us > most_us ? most_us : twice_us < least_us ? least_us : twice_us;
+  bring_up->next_us = bring_up->began_us + bring_up->interval_us;
   return (struct bring_up_result){admitted, bring_up->differs | bring_up->blank};
 }

@@ -3,9 +3,10 @@
  * A sensor is admitted when it has acknowledged the reset and its whole PROM. PROMs are read up to three times, until
  * all of them are good. One whose CRC still differs is used and reported. A blank one is not used.
  *
- * That costs 5 ms of frames with a data line for each sensor, and some 25 ms behind multiplexers. So it takes at most 5 % of the time.
- * While it leaves a sensor out, or is for a suspect, the next one comes after 1, 2, 4 and then 8 s. A sensor that does not answer at all
- * costs no admission. One whose CRC differs costs BRING_UP_RECHECKS, since the bus may have been disturbed. */
+ * That costs 5 ms of frames with a data line for each sensor, and some 25 ms behind multiplexers. So the next ones come
+ * after 16, 32 ms and so on up to a second, and to 8 s where they are for suspects. While one leaves a sensor out they
+ * come after 1, 2, 4 and then 8 s. A sensor that does not answer at all costs no admission. One whose CRC differs costs
+ * BRING_UP_RECHECKS, since the bus may have been disturbed. */
 #pragma once
 
 #include "array_bus/array_bus.h"
@@ -29,7 +30,7 @@ struct bring_up {
   uint8_t rechecks;    /* admissions in a row after which a CRC differed */
   sensor_map changed;  /* bitmap: another PROM than before; cleared once reported */
   uint64_t began_us;
-  uint64_t interval_us;
+  uint32_t interval_us;                    /* from this one to the next at least */
   uint64_t next_us;                        /* the next one not before */
   struct ms58xx_prom read[FT_MAX_SENSORS]; /* in this pass */
   struct ms58xx_prom prom[FT_MAX_SENSORS]; /* [sensor] in use */
@@ -57,4 +58,4 @@ static inline bool bring_up_wants_recheck(const struct bring_up *bring_up) {
   return bring_up->differs != 0 && bring_up->rechecks <= BRING_UP_RECHECKS;
 }
 
-struct bring_up_result bring_up_end(struct bring_up *bring_up, uint64_t now_us);
+struct bring_up_result bring_up_end(struct bring_up *bring_up);

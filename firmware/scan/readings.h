@@ -4,8 +4,9 @@
  * READINGS_TEMPERATURE_NEAR_cC if that one is old (is_late). That is no change of temperature. The last one stays in
  * use, and the sensor is doubtful: each degree is worth some 240 Pa. Two of them that agree with each other come from a
  * sensor that has lost its state as its supply failed. It becomes a suspect. The first temperature of a sensor must be
- * near the others', too. If the sensor reports the same twice before a reset and after each of two, it is believed and
- * stays doubtful. (After one reset it may have lost its state again: supplies that dip once do so twice.)
+ * near the others', too, but after a reset near its own last: it may have lost its state again, and so may most others
+ * (supplies that dip once do so twice). If resets do not help for a second, and it reports the same twice, it is believed.
+ * Far from the others' it stays doubtful.
  *
  * Pressures. A pressure below zero is left out. A second in a row makes the sensor a suspect. A large step of one
  * sensor alone is left out as well, since rubber passes any press on to its neighbours. If the next reading is back,
@@ -80,8 +81,8 @@ struct readings {
   sensor_map suspects;     /* bitmap: want a reset */
   sensor_map jolted;       /* bitmap: doubtful until their temperature shows that they kept their state */
   sensor_map zero;         /* bitmap: of those, left out */
-  sensor_map reset_once;   /* bitmap: had one for that reason */
-  sensor_map pardoned;     /* bitmap: and another one */
+  sensor_map known;        /* bitmap: had a temperature, and has been there since */
+  sensor_map pardoned;     /* bitmap: resets have not helped */
   uint32_t left_out;       /* since start: pressures below zero or that stepped alone */
   sensor_map alike;        /* bitmap: has read the others' temperature since it came */
   sensor_map was_alike;    /* bitmap: at the last temperature */
@@ -101,6 +102,8 @@ struct readings_temperature {
   sensor_map prom_bad;            /* bitmap: the CRC differs */
   sensor_map admitted;            /* bitmap */
   bool is_late;                   /* long after the one before */
+  bool is_soon;                   /* after the one before: nothing was away for long */
+  bool is_patient;                /* resets have not helped for a second */
 };
 
 enum readings_news {

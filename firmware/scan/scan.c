@@ -102,8 +102,8 @@ static void begin_bring_up(struct scan *scan, uint64_t now_us) {
   enter(scan, SCAN_RESET);
 }
 
-static void end_bring_up(struct scan *scan, uint64_t now_us) {
-  const struct bring_up_result result = bring_up_end(&scan->bring_up, now_us);
+static void end_bring_up(struct scan *scan) {
+  const struct bring_up_result result = bring_up_end(&scan->bring_up);
   scan->returned |= result.admitted & ~scan_read(&scan->admitted);
   set(&scan->admitted, result.admitted);
   set(&scan->prom_bad, result.bad);
@@ -380,7 +380,7 @@ static void end_operation(struct scan *scan, uint64_t now_us) {
     if (bring_up_take_word(&scan->bring_up, &scan->result)) {
       enter(scan, SCAN_READ_PROM);
     } else {
-      end_bring_up(scan, now_us);
+      end_bring_up(scan);
     }
     break;
   case SCAN_CONVERT:
@@ -468,6 +468,7 @@ static void adapt_interval(struct scan *scan, uint32_t news) {
 }
 
 static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
+  const uint32_t apart_us = (uint32_t)(slot->conversion.t_us - scan->temperature_us);
   const struct readings_temperature taken = {
       .prom = scan->bring_up.prom,
       .code = slot->code,
@@ -476,7 +477,9 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
       .returned = slot->returned,
       .prom_bad = scan_read(&scan->prom_bad),
       .admitted = scan_read(&scan->admitted),
-      .is_late = slot->conversion.t_us - scan->temperature_us > TEMPERATURE_LATE_us,
+      .is_late = apart_us > TEMPERATURE_LATE_us,
+      .is_soon = TEMPERATURE_INTERVAL_us > apart_us,
+      .is_patient = scan->bring_up.interval_us > 1000000u,
   };
   scan->temperature_us = slot->conversion.t_us;
   adapt_interval(scan, readings_take_temperature(&scan->readings, scan->sensor_count, &taken));

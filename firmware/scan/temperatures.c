@@ -49,8 +49,10 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const s
   bool use;
   bool insists; /* reports it again, and it cannot be */
   if (!(readings->has_thermal & bit)) {
-    use = near || (agrees && possible && (readings->pardoned & bit));
-    insists = agrees && !use;
+    const bool pardoned = readings->pardoned & bit, known = readings->known & bit;
+    const bool kept = known ? within(now_cC - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_STEP_MAX_cC) : near;
+    use = possible && (kept || (agrees && pardoned));
+    insists = !use && (agrees || (known && !pardoned));
   } else {
     const int32_t most_cC = is_late && !readings->jolted ? READINGS_TEMPERATURE_NEAR_cC : READINGS_TEMPERATURE_STEP_MAX_cC;
     use = within(now_cC - readings->thermal[k].first_order_cC, most_cC);
@@ -67,11 +69,13 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const s
   return true;
 }
 
-static void forget(struct readings *readings, sensor_map sensors) {
+static void forget(struct readings *readings, const struct readings_temperature *taken) {
+  const sensor_map sensors = taken->prom_changed | taken->returned | ~taken->admitted;
   const sensor_map reset = readings->suspects & sensors;
   readings->restored |= reset & ~readings->jolted; /* before a jolt it had its state */
-  readings->pardoned = (readings->pardoned & ~sensors) | (readings->reset_once & reset);
-  readings->reset_once = (readings->reset_once & ~sensors) | reset;
+  readings->pardoned = (readings->pardoned & ~sensors) | (taken->is_patient ? reset & ~readings->has_thermal : 0);
+  readings->known = (readings->known | readings->has_thermal) & ~(taken->prom_changed | readings->strange);
+  readings->known &= taken->is_soon ? ~(sensor_map)0 : taken->admitted;
   readings->has_thermal &= ~sensors;
   readings->doubted &= ~sensors;
   readings->strange &= ~sensors;
@@ -151,10 +155,9 @@ static bool is_unusual(const struct readings *readings, uint8_t sensor_count, se
 }
 
 uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count, const struct readings_temperature *taken) {
-  const sensor_map fresh = taken->prom_changed | taken->returned;
-  forget(readings, fresh | ~taken->admitted);
+  forget(readings, taken);
   readings->renewed |= taken->prom_changed;
-  readings->unproven = (readings->unproven | fresh) & taken->prom_bad;
+  readings->unproven = (readings->unproven | taken->prom_changed | taken->returned) & taken->prom_bad;
   if (readings->unproven) {
     prove(readings, sensor_count);
   }
