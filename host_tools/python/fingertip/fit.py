@@ -304,7 +304,8 @@ def _fit(
     scale = float(known.get("force_scale", 0.0))
     scales = (scale, float(known["force_scale_sd"])) if scale else (1.0, float(chip.constants["default_force_scale_sd"]))
     force_N = np.zeros((len(rows), 2))
-    chip.call("weigh", *scales, fits, readings[rows].max(axis=1) / 1024.0, force_N)
+    unsearched = chip.fit(array, settings, readings[rows], usable[:, -1].copy(), own=own)  # that nothing seems to pull
+    chip.call("weigh", *scales, unsearched, readings[rows].max(axis=1) / 1024.0, force_N)
     flags = fits["flags"].astype(np.int64)
     valid = flags & Flag.FIT_VALID != 0
     names = ("x_mm", "y_mm", "location_sd_mm", "p0_Pa", "sigma_mm", "residual_rms_Pa")

@@ -105,6 +105,10 @@ class Fit(unittest.TestCase):
                 wanted_N = np.hypot(exact["force_sd_N"], known["force_N"] * 0.1)
                 np.testing.assert_allclose(known["force_sd_N"], wanted_N, rtol=2e-3)  # bits of fit_quadrature()
         self.assertGreater(known["q_sd_N"][0], 0.1 * abs(known["qx_N"][0]))  # the scale of silicone that nobody has pulled
+        *xy_mm, dented_Pa = presses(PAD, 200, 2.5, seed=5)
+        dented = fingertip.fit(dented_Pa - 200.0 * responses(PAD, *xy_mm, 6.25), "2x4", calibration={"sigma_mm": 2.5, "sigma_sd_mm": 0.1})
+        self.assertTrue((dented["location_sd_mm"] > dented["sigma_mm"]).any())  # it may be pulled, which takes nothing of its force
+        np.testing.assert_allclose(dented["force_N"], 2e-6 * np.pi * dented["p0_Pa"] * dented["sigma_mm"] ** 2, rtol=1e-5)
 
     def test_rows_with_a_time_are_contacts_by_the_gate(self):
         t_s = 0.01 * np.arange(300)
@@ -136,7 +140,7 @@ class Fit(unittest.TestCase):
             (readings_Pa, "2x4", {"zero_rows": 11}, "give rows that are there"),
             (readings_Pa, "2x4", {"noise_Pa": 0.0}, "and noise above 0"),
             (readings_Pa, "2x4", {"calibration": {"gain": [0.0] * 8}}, "gain is \\[0.0"),
-            (readings_Pa, "2x4", {"calibration": {"gain": "high"}}, "gain has 1 values"),
+            (readings_Pa, "2x4", {"calibration": {"gain": [1.0] * 7}}, "gain has 7 values"),
             (readings_Pa, "2x4", {"calibration": {"gains": []}}, "has none of sigma_mm"),
             (readings_Pa, "2x4", {"calibration": {"force_scale": 1.0}}, "without its standard deviation"),
             (readings_Pa, "2x4", {"calibration": "/"}, "/: Is a directory"),
@@ -150,15 +154,13 @@ class Fit(unittest.TestCase):
             (readings_Pa + 1e5, "2x4", {}, "as the air's"),
             (readings_Pa * np.nan, "2x4", {}, "none is a number"),
             (readings_Pa, "2x4", {"time_s": np.zeros(10)}, "time does not rise"),
-            (readings_Pa, "2x4", {"calibration": {"gain": [1.0] * 7}}, "gain has 7 values"),
         ):
             with self.subTest(words), self.assertRaisesRegex(fingertip.InputError, words):
                 fingertip.fit(values, pad, **more)
-        lost_s = t_s + 0.2 * (t_s > 0.15)
         for values, more, words in (
             (series_Pa + 5 * np.vstack([rest_Pa, rest_Pa]), {"zero_rows": 10}, "readings scatter by 2. Pa from row to row"),
             (series_Pa / 100, {"noise_Pa": 1.0}, "that of a few grams"),
-            (series_Pa, {"time_s": lost_s}, "rows are lost at 1 places, the longest of 0.21 s before row 17"),
+            (series_Pa, {"time_s": t_s + 0.2 * (t_s > 0.15)}, "rows are lost at 1 places, the longest of 0.21 s before row 17"),
             (series_Pa[10:], {"time_s": t_s[:10]}, "the first row is touched"),
         ):
             with self.subTest(words), self.assertWarnsRegex(UserWarning, words):
@@ -196,10 +198,9 @@ class Fit(unittest.TestCase):
                 self.assertIn(f"fingertip fit: {(path + ': ') * refused}{words}", run("--pad", "2x4", *options, status=refused))
             pathlib.Path(path).write_text("\n".join(f"{1.7e9 + k / 1000!r},{line.split(',', 2)[2]}" for k, line in enumerate(lines)))
             self.assertIn("\n1700000000.029,", run("--pad", "2x4", "--unit", "kPa"))
-            pathlib.Path(path).write_text("\n".join([lines[0], lines[1] + ",1"]))
-            self.assertIn(":2: 11 cells, and 10 before", run(*right, status=1))
-            pathlib.Path(path).write_text("\n".join([lines[0], lines[1] + "x"]))
-            self.assertIn(":2: could not convert", run(*right, status=1))
+            for more, words in ((",1", ":2: 11 cells, and 10 before"), ("x", ":2: could not convert")):
+                pathlib.Path(path).write_text("\n".join([lines[0], lines[1] + more]))
+                self.assertIn(words, run(*right, status=1))
 
 
 if __name__ == "__main__":

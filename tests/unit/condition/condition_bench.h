@@ -11,7 +11,6 @@ enum { SENSORS = 15 };
 #define AMBIENT (100000 * Pa)
 #define NOISE (4 * Pa)
 #define OPEN (GATE_OPEN_Pa * Pa + GATE_OPEN_SIGMA * NOISE)
-#define CLOSE (GATE_CLOSE_Pa * Pa + GATE_CLOSE_SIGMA * NOISE)
 
 extern struct condition condition;
 extern struct conditioned conditioned;
