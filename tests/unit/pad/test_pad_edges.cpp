@@ -95,7 +95,7 @@ static void take_back(const wire_info &info, float dip_share, double was) {
   const twin::BlockTable ends = block(pad::own_sensors());
   double without = 0.0, with = 0.0;
   int count = 0, told_none = 0;
-  for (double x_mm = -7.3; x_mm < 9.0; x_mm += 4.9) {
+  for (double x_mm = -11.5; x_mm < 9.0; x_mm += 4.9) { // the first is 2.5 mm beyond the outer sensors
     for (double y_mm = -15.1; y_mm < 18.0; y_mm += 6.1) {
       for (const double qx : {0.0, 0.25}) {
         const double qy = -0.6 * qx;
@@ -109,8 +109,8 @@ static void take_back(const wire_info &info, float dip_share, double was) {
         with += std::hypot(good.qx - qx, good.qy - qy);
         count++;
         EXPECT_LT(std::hypot(good.qx - qx, good.qy - qy), 0.07) << x_mm << ' ' << y_mm;
-        EXPECT_LT(std::hypot(good.x_mm - x_mm, good.y_mm - y_mm), 0.4) << x_mm << ' ' << y_mm;
-        EXPECT_NEAR(good.force, 1.0, 0.05) << x_mm << ' ' << y_mm;
+        EXPECT_LT(std::hypot(good.x_mm - x_mm, good.y_mm - y_mm), x_mm < -9.0 ? 0.5 : 0.4) << x_mm << ' ' << y_mm;
+        EXPECT_NEAR(good.force, 1.0, x_mm < -9.0 ? 0.08 : 0.06) << x_mm << ' ' << y_mm;
       }
     }
   }
