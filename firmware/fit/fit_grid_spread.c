@@ -167,7 +167,7 @@ NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid, const struc
   }
   const uint8_t *sensor = grid->sensor;
   int32_t *errors = room->q14;
-  uint32_t most = fit_has_dip(settings) ? (uint32_t)FIT_DIP_ERROR_Q16 >> 2 : 1; /* the dip is at most a quarter */
+  uint32_t most = fit_has_dip(settings) ? (uint32_t)FIT_DIP_ERROR_Q16 >> 1 : 1; /* the dip is at most a quarter */
   put_pasts(sensor, settings, spread, errors);
   for (int k = 0; k < NODES; k++) {
     most |= (uint32_t)fixed_longer_leg(settings->gain_sd_q16[sensor[k]], errors[k]);

@@ -74,7 +74,7 @@ static inline float fit_location_sd_limit_mm(const struct fit_settings *settings
 #define FIT_DIP_DEPTH_MAX 0.25f
 /* What the dip may be off by at each sensor, of itself. It counts where the derivatives have the
  * dip. Chosen on the recording that chooses of host_tools/report/real. */
-#define FIT_DIP_ERROR 0.2f
+#define FIT_DIP_ERROR 0.1f
 #define FIT_DIP_ERROR_Q16 ((int32_t)(FIT_DIP_ERROR * 65536.0f))
 /* Where the derivatives have the dip, a sensor of an outer row has that of a contact there less this share, which falls by 3/4 per pitch
  * inwards. On recordings that only show: 0.2 to 0.8. */

@@ -5,9 +5,7 @@
 #include "fit/fit_math.h"
 #include "fit/fit_tangential_parts.h"
 
-/* 0.005 of the largest reading, and of a known dip half of what it may be off by in its middle. */
-#define MODEL_SD_Q16 328
-#define DIP_SD_Q16 (FIT_DIP_ERROR_Q16 / 2)
+#define MODEL_SD_Q16 328 /* 0.005 of the largest reading; besides, what a known dip may be off by in its middle */
 /* Prior of both elongations. */
 #define ELONGATION_SD_mm2 4.0f
 
@@ -284,7 +282,7 @@ static void set_known(const struct fit_array *array, const struct fit_settings *
     int32_t sd_q20 = fixed_mul_q30(fit_fixed(settings->dip_sd_mm, 20), problem->pad->per_unit_q30);
     int32_t sd_q13 = fixed_clamp(sd_q20 >> 7, DIP_SD_LEAST_Q13, DIP_SD_MOST_Q13);
     int32_t share_q16 = fit_fixed(settings->dip_share, 16), square_q26 = sd_q13 * sd_q13;
-    problem->model_sd_q16 = fixed_longer_leg(MODEL_SD_Q16, fixed_mul_16(share_q16, DIP_SD_Q16));
+    problem->model_sd_q16 = fixed_longer_leg(MODEL_SD_Q16, fixed_mul_16(share_q16, FIT_DIP_ERROR_Q16));
     problem->dip_q22 = fixed_mul_q26(fixed_mul_16(problem->pad->height_q26, share_q16), square_q26) >> 4;
     problem->dip_variance_q26 = square_q26 - problem->pad->spread_q26;
   }
