@@ -141,8 +141,8 @@ def route(size, pads, free):
         box = whole((x - w / 2, y - h / 2, x + w / 2, y + h / 2))
         grid.fix(box, (layer,), numbers[net])
         grid.fix(box, (VIA,), TAKEN, 0)  # it would take the pad's solder
-        if net:
-            ends[net].append(((x, y), [3 * cell + layer for cell in grid.near(box, 0)]))
+        if net:  # to KiCad, a track that ends on a pad's edge does not end in it
+            ends[net].append(((x, y), [3 * cell + layer for cell in grid.near(box, -1)]))
     waiting, laid = sorted(ends, key=lambda net: len(ends[net])), {}
     for _ in range(ROUNDS):
         if not waiting:
