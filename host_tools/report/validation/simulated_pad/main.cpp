@@ -115,7 +115,7 @@ private:
     }
     send(command_calibrate(
         calibrating::calibration_of(solution, calibrating::force_scale(array, placements, solution, measure::WEIGHT_N, shape), DATE_s),
-        SENSORS));
+        geometry.sensor_count));
   }
 
   void run_to(std::uint64_t t_us) {
