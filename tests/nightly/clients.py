@@ -1,7 +1,7 @@
 """Many programs on one fingertip: what `fingertip serve` delivers to each, how late, and what it answers.
 
 `fingertip serve` shares two simulated fingertips of the highest rate with eight clients, four each. Each client reads both streams and sends a command
-ten times a second, at the same instants as the others. One of them reads nothing in the middle third. Of one fingertip every byte goes to a second
+ten times a second, at the same instants as the others. One of them reads nothing for eight seconds; after twelve it would be turned away. Of one fingertip every byte goes to a second
 terminal too, which is read directly: added is the time from a frame's arrival there to its arrival at a client.
 """
 
@@ -19,7 +19,7 @@ from nightly import Programs, busy_s, job, wait_for
 from fingertip import wire
 from fingertip.discovery import find_shared
 
-SERIALS, CLIENTS_EACH, SECONDS = ("AAAA", "BBBB"), 4, 60
+SERIALS, CLIENTS_EACH, SECONDS, STOPPED_s = ("AAAA", "BBBB"), 4, 60, 8
 RATE_Hz = 1310  # 763 us a frame; 764 would be 1308.9, and the last one may come late
 TICK_s, LAST_ANSWERS_s = 0.1, 3
 COMMANDS = (wire.AskHealth(), wire.SetSlip(0.5, 100), wire.Tare(1), wire.SetRate(1308000), wire.AskInfo(), wire.SetLocationLimit(0.5))
@@ -54,17 +54,16 @@ class Client:
 
 def listen(direct, clients, stopped, seconds):
     """Reads all but the one that is stopped, and sends the commands."""
-    begin_s = time.monotonic()
-    end_s, tick = begin_s + seconds, 0
+    begin_s, tick = time.monotonic(), 0
     with selectors.DefaultSelector() as selector:
         for client in (direct, *clients):
             selector.register(client.descriptor, selectors.EVENT_READ, client)
         reads = True
-        while (now_s := time.monotonic()) < end_s:
-            if reads != (not seconds / 3 <= now_s - begin_s < 2 * seconds / 3):
+        while (now_s := time.monotonic()) < begin_s + seconds:
+            if reads != (not 0 <= now_s - begin_s - seconds / 3 < STOPPED_s):
                 reads = not reads
                 (selector.register(stopped.descriptor, selectors.EVENT_READ, stopped) if reads else selector.unregister(stopped.descriptor))
-            if now_s - begin_s > tick * TICK_s and now_s < end_s - LAST_ANSWERS_s:
+            if now_s - begin_s > tick * TICK_s and now_s < begin_s + seconds - LAST_ANSWERS_s:
                 for client in clients if reads else [each for each in clients if each is not stopped]:
                     client.send(COMMANDS[tick % len(COMMANDS)])
                 tick += 1

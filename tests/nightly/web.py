@@ -76,12 +76,13 @@ def browser(build):
             with Programs(build) as programs, Bench(tools) as bench:
                 url = bench.served(str(programs.folder))
                 with Browser(str(programs.folder)) as chromium:
-                    ready_s.append(driven.ready_s(chromium.page(url + "/")))
+                    ready_s.append(driven.ready_s(chromium.page(url)))
         with Programs(build) as programs, Bench(tools) as bench:
             url = bench.served(str(programs.folder))
-            with Browser(str(programs.folder), build / "tests/web/libweb_test_ports.so", {"SerialAllowAllPortsForUrls": [url]}) as chromium:
+            ports, policy = build / "tests/web/libweb_test_ports.so", {"SerialAllowAllPortsForUrls": [url.partition("/?")[0]]}
+            with Browser(str(programs.folder), ports, policy) as chromium:
                 bench.fake(chromium, "AAAA", f"rate={RATE_Hz}", f"life={WATCHED_s + REMEMBERED_s + 120}")
-                page = chromium.page(url + "/")
+                page = chromium.page(url)
                 driven.connected(page, 1)
                 found = watched(page, WATCHED_s)
                 for at_s in range(0, REMEMBERED_s + 1, SAMPLE_s):

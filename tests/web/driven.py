@@ -13,4 +13,4 @@ def ready_s(page):
 
 def connected(page, count):
     """So many fingertips stream."""
-    page.until(f"fingertip.fingertips.filter(each => each.state === 'live' && each.contacts > 0).length === {count}")
+    page.until(f"globalThis.fingertip?.fingertips.filter(each => each.state === 'live' && each.contacts > 0).length === {count}")

@@ -300,7 +300,7 @@ class Recording:
 # Some 20 MB are read in a second: below this the wait is short.
 WORTH_WAITING_bytes = 10_000_000
 LATE_s = 1.0  # a row may come behind later ones by less than this
-HEAD_MOST_bytes = 1_000_000  # of a recording that an editor or a spreadsheet has saved
+HEADER_WITHIN_bytes = 200_000  # of a recording that a spreadsheet has saved
 BLOCK_bytes, ROWS_AT_ONCE = 500_000, 1024  # about the same; more take no less time each
 JOINT_COLUMNS = "device,time_us,"
 
@@ -347,7 +347,7 @@ class _RecordingLines:
         """The same, but rows, or what else is neither comment nor blank, many at a time."""
         try:
             with open(self.path, "rb") as file:
-                start = file.read(HEAD_MOST_bytes)
+                start = file.read(HEADER_WITHIN_bytes)
                 if start.startswith(MAGIC):
                     self.mcap = McapLineReader(self.path, self.progress, self.interval_s)
                     yield from self.mcap.items()
