@@ -19,7 +19,7 @@ namespace fingertip::pad {
 namespace {
 
 constexpr double FORCE_N = 5.0, RATIO = 0.3;     // the estimate is linear in the former, nearly in both
-constexpr double STEP_mm = 1.5, BEYOND_mm = 1.5; // beyond the outer sensors: of 0, 1.5, 3 and 4.5, on the twin's seeds 21, 22, 24
+constexpr double STEP_mm = 1.5, BEYOND_mm = 1.5; // beyond the outer sensors: of 0, 1.5, 3, 4.5, on the twin's seeds 21, 22, 24
 constexpr double GAIN_SD = 0.015;                // of a calibrated pad: what the readings are weighed by
 
 struct Contact {
@@ -182,8 +182,9 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std:
   const twin::Block rubber{twin::silicone(of(profile.thickness_mm)), half_x + overhang_mm, half_y + overhang_mm};
   const twin::BlockTable block = twin::BlockTable::load_or_build(rubber, sensors, cache_directory, on_progress);
   std::vector<twin::Place> places;
-  for (double x_mm = -half_x - BEYOND_mm; x_mm <= half_x + BEYOND_mm + 1e-9; x_mm += STEP_mm) {
-    for (double y_mm = -half_y - BEYOND_mm; y_mm <= half_y + BEYOND_mm + 1e-9; y_mm += STEP_mm) {
+  const double beyond_mm = overhang_mm < 6.0 * BEYOND_mm ? 0.0 : BEYOND_mm; // where ends are nearer it costs too much inside
+  for (double x_mm = -half_x - beyond_mm; x_mm <= half_x + beyond_mm + 1e-9; x_mm += STEP_mm) {
+    for (double y_mm = -half_y - beyond_mm; y_mm <= half_y + beyond_mm + 1e-9; y_mm += STEP_mm) {
       places.push_back({x_mm, y_mm});
     }
   }

@@ -2,10 +2,10 @@
 // correction: coefficients of pad_edges (firmware/common/pad_profile.h).
 //
 // The estimate assumes a layer without end. edges_of passes contacts on the pad's own block (pad/block.hpp) through the firmware's
-// estimate, at places all over the array and 1.5 mm beyond, with no load and with one along each axis. It fits the polynomials to the
-// result. They subtract the mean response of a usual contact, spread_mm2 wide. On 12 mm of rubber with 6 to 13 mm of overhang the zero's
-// error is then 0.01 to 0.03 of the normal force, and 0.10 to 0.20 without (part shear of the report). Simulated: no real pad has been
-// measured. An edge that is rounded, glued or pressed against a frame is another one.
+// estimate, at places all over the array and, from 9 mm of overhang on, 1.5 mm beyond, with no load and with one along each axis. It fits
+// the polynomials to the result. They subtract the mean response of a usual contact, spread_mm2 wide. On 12 mm of rubber with 6 to 13 mm of
+// overhang the zero's error is then 0.01 to 0.03 of the normal force, and 0.10 to 0.20 without (part shear of the report). Simulated: no
+// real pad has been measured. An edge that is rounded, glued or pressed against a frame is another one.
 #pragma once
 
 #include "libfingertip/wire.hpp"
