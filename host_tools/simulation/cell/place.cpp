@@ -63,8 +63,8 @@ std::vector<FingerProcess> Place::fingers(std::size_t count, std::uint64_t seed,
   for (std::size_t i = 0; i < count; i++) {
     FingerProcess &finger = fingers.emplace_back(FingerProcess{SERIALS[i], port(SIDES[i]), 2 * seed + i, {}, calibrated_sd, parallel_bus});
     Random random(finger.seed, GAINS, 0);
-    for (double &gain : finger.gain) {
-      gain = 1.0 + std::clamp(gain_sd * random.normal(), -0.5, 0.5);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      finger.gain[k] = 1.0 + std::clamp(gain_sd * random.normal(), -0.5, 0.5);
     }
   }
   return fingers;

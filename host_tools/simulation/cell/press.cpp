@@ -106,8 +106,8 @@ std::string head_of(const PressOptions &options, const std::vector<FingerProcess
   text << "# simulated: the truth of presses; time_us is CLOCK_MONOTONIC\n# weight_g: " << options.weight_g << "\n# seed: " << options.seed;
   for (std::size_t i = 0; i < fingers.size(); i++) {
     text << "\n# gain_" << SIDES[i] << ":";
-    for (double gain : fingers[i].gain) {
-      text << " " << gain;
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      text << " " << fingers[i].gain[k];
     }
   }
   text << "\ntime_us";
