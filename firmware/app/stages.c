@@ -106,9 +106,8 @@ void stages_process(struct stages *stages, struct findings *found, uint32_t take
 }
 
 #if FT_WITH_FIT
-static void send_contact(const struct stages *stages, const struct findings *found, struct line *line) {
+void stages_put_contact(const struct stages *stages, const struct findings *found, struct wire_contact *packet) {
   (void)stages; /* only shapes are not in the findings */
-  struct wire_contact *packet = &line->packet.body.contact;
   contact_stage_put(found, packet);
   location_stage_put(found, packet);
 #if FT_WITH_TANGENTIAL
@@ -117,7 +116,6 @@ static void send_contact(const struct stages *stages, const struct findings *fou
 #if FT_WITH_SHAPES
   shapes_stage_put(&stages->shapes, found, packet);
 #endif
-  line_send(line, &wire_contact_layout, found->frame.t_us);
 }
 #endif
 
@@ -132,7 +130,8 @@ static void send_raw(const struct stages *stages, const struct findings *found, 
 void stages_send(const struct stages *stages, const struct findings *found, uint8_t streams, struct line *line) {
 #if FT_WITH_FIT
   if (streams & WIRE_STREAM_CONTACT) {
-    send_contact(stages, found, line);
+    stages_put_contact(stages, found, &line->packet.body.contact);
+    line_send(line, &wire_contact_layout, found->frame.t_us);
   }
 #endif
 #if FT_WITH_RAW_STREAM

@@ -62,6 +62,9 @@ void stages_process(struct stages *stages, struct findings *found, uint32_t take
 /* The packets that these streams ask for (enum wire_stream). */
 void stages_send(const struct stages *stages, const struct findings *found, uint8_t streams, struct line *line);
 
+/* Fills in what the stages know of a contact packet. A scene without the fit has none. */
+void stages_put_contact(const struct stages *stages, const struct findings *found, struct wire_contact *packet);
+
 /* After the packets: what only the frames to come need. */
 void stages_follow(struct stages *stages, const struct findings *found, struct scan *scan);
 

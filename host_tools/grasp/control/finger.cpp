@@ -20,37 +20,58 @@ constexpr double DELAY_SHARE = 0.05; // weight of a frame in the moving average 
 constexpr int ZERO_FRAMES = 3;
 constexpr double LOAD_SD_LEAST_N = 0.06;
 constexpr double SHARED_N = 0.3; // a load whose share of both has a meaning
-// A force whose standard deviation is a larger share of it is no measurement. A plate's is measured: only how
-// far it reaches beyond the pad is not.
-constexpr double FORCE_SD_MOST = 1.0;
+constexpr double SURE_SDS = 2.0;
+// A force whose standard deviation is a larger share of it is no measurement. That of a long or wide contact is measured: only how far it
+// reaches beyond the pad is not.
+constexpr double FORCE_SD_MOST = 1.0, WIDE_mm = 15.0;
 // A tangential force with one of these flags is not trusted.
 constexpr std::uint32_t FORCE_ONLY =
     CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SATURATED | CONTACT_FLAG_ZERO_DOUBTFUL;
-// A place with one of these flags is not trusted. UNCERTAIN is: a tangential force may have moved the place, which is what shows that
-// force.
+// A place with one of these flags is not trusted. UNCERTAIN is: the place may have moved under the tangential force that it shows.
 constexpr std::uint32_t NO_PLACE = FORCE_ONLY & ~std::uint32_t{CONTACT_FLAG_UNCERTAIN};
-// A tangential force as large as the normal one moves the Gaussian by about this many sigmas or more, whatever the shape,
-// but a wide one by 3.4 to 7 mm however large its sigma is, on 12 mm of rubber (unit.cell.face).
-constexpr double PULLED = 0.5, PULLED_mm = 3.75;
-constexpr double PULLS_s = 0.025; // one frame alone shows no pull
+// A tangential force as large as the normal one moves the middle of what the pad bears of the Gaussian by about so much, x and y, on
+// 12 mm of rubber, whatever the shape, but along a contact as long as the pad by less (unit.cell.face).
+constexpr double PULLED_x_mm = 3.5, PULLED_y_mm = 4.2, LONG_mm = 14.0;
+constexpr double PULLS_s = 0.025, LEAPS = 0.5; // one frame alone shows no pull
+constexpr double PLACE_SD = 0.2;               // of a load by the place
+// Share of what one place alone shows that is load at least: fingertips may be mounted another way than assumed.
+constexpr double ALONE = 0.33;
+constexpr double SLIDES_mm_s = 1.0;
 constexpr std::uint32_t OVER = CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND;
-// A contact with a larger sigma is a plate. Its Gaussian reaches far beyond the pad, so only the part
-// of its force that lies on the pad counts. A block of 36 by 54 mm is such a plate.
-constexpr double WIDE_mm = 15.0, PAD_mm2 = 1400.0;
+// Half of the pad, with its rubber beyond the outer sensors.
+constexpr double PAD_x_mm = 18.0, PAD_y_mm = 27.0;
 
-static double force_on_pad(const GripTouch &touch) {
-  if ((touch.flags & CONTACT_FLAG_FIT_VALID) == 0 || touch.sigma_mm <= WIDE_mm) {
-    return touch.force_N;
+// What the pad bears of a Gaussian along one axis: its share of the whole, and its middle.
+struct Borne {
+  double share, middle_mm;
+};
+static Borne borne(double at_mm, double sigma_mm, double half_mm) {
+  const double low = (-half_mm - at_mm) / sigma_mm, high = (half_mm - at_mm) / sigma_mm;
+  const double share = 0.5 * (std::erf(high * M_SQRT1_2) - std::erf(low * M_SQRT1_2));
+  const double peak_mm = sigma_mm / std::sqrt(2.0 * M_PI);
+  const double moved_mm = peak_mm * (std::exp(-0.5 * low * low) - std::exp(-0.5 * high * high)) / std::max(share, 1e-6);
+  return {share, std::clamp(at_mm + moved_mm, -half_mm, half_mm)};
+}
+
+// A contact that is not round, or whose tangential force is not known, counts as far as the pad bears it.
+static GripTouch on_pad(GripTouch touch) {
+  if ((touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) == 0) {
+    const double sigma_mm = std::max(touch.sigma_mm, 1.0);
+    const Borne x = borne(touch.x_mm, sigma_mm, PAD_x_mm), y = borne(touch.y_mm, sigma_mm, PAD_y_mm);
+    touch.force_N *= x.share * y.share;
+    touch.x_mm = x.middle_mm;
+    touch.y_mm = y.middle_mm;
   }
-  return touch.force_N * PAD_mm2 / (PAD_mm2 + 0.85 * 2.0 * M_PI * touch.sigma_mm * touch.sigma_mm);
+  return touch;
 }
 
 static bool force_is_valid(const GripTouch &touch) {
   if ((touch.flags & CONTACT_FLAG_CONTACT) == 0) {
     return true; // the force is 0
   }
-  return (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (touch.sigma_mm > WIDE_mm || (touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 ||
-                                                         touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
+  const bool is_long = (touch.flags & CONTACT_FLAG_ELONGATED) != 0 || touch.sigma_mm > WIDE_mm;
+  return (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 &&
+         (is_long || (touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 || touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
 }
 
 static bool is_same(const GripTouch &a, const GripTouch &b) {
@@ -63,30 +84,54 @@ void GripFinger::take(const GripTouch &touch) {
     return;
   }
   const bool has_contact = (touch.flags & CONTACT_FLAG_CONTACT) != 0 && (touch.flags & CONTACT_FLAG_HELD) == 0;
-  if (!is_heard_ || !has_contact || !is_same(touch_, touch)) {
+  if (!is_heard_ || !has_contact || !is_same(came_, touch)) {
     changed_s_ = touch.t_s;
     unchanged_ = 0;
   } else {
     unchanged_++;
   }
-  touch_ = touch;
+  came_ = touch;
+  touch_ = on_pad(touch);
   is_heard_ = is_new_ = true;
   if (force_is_valid(touch)) {
     const bool contact = (touch.flags & CONTACT_FLAG_CONTACT) != 0;
     force_t_s_ = touch.t_s;
-    force_N_ = contact ? std::max(force_on_pad(touch), 0.0) : 0.0;
+    force_N_ = contact ? std::max(touch_.force_N, 0.0) : 0.0;
     sd_N_ = (touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) != 0 ? touch.force_sd_N : 0.0;
   }
   if (has_load()) {
     load_zero_.take(touch.qx_N, touch.qy_N);
   }
-  if (has_contact && (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (touch.flags & NO_PLACE) == 0) {
-    place_zero_.take(touch.x_mm, touch.y_mm);
-    const double moved_mm = place_zero_.is_known ? std::hypot(touch.x_mm - place_zero_.x, touch.y_mm - place_zero_.y) : 0.0;
-    const double pulled = moved_mm / std::min(PULLED * std::max(touch.sigma_mm, 1.0), PULLED_mm);
-    pulled_ = std::min(pulled, pulled_ + (pulled - pulled_) * std::min((touch.t_s - place_t_s_) / PULLS_s, 1.0));
-    place_t_s_ = touch.t_s;
+  if (has_contact && (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (touch.flags & (NO_PLACE | CONTACT_FLAG_TANGENTIAL_VALID)) == 0) {
+    follow_place();
   }
+}
+
+void GripFinger::follow_place() {
+  const double passed_s = std::max(touch_.t_s - place_t_s_, 1e-6);
+  place_t_s_ = touch_.t_s;
+  if (!place_zero_.is_known) {
+    place_zero_.take(touch_.x_mm, touch_.y_mm);
+    pulled_x_ = pulled_y_ = 0.0;
+    return;
+  }
+  const double share = std::min(passed_s / PULLS_s, 1.0);
+  const auto follow = [share](double &pulled, double moved) { pulled += share * std::clamp(moved - pulled, -LEAPS, LEAPS); };
+  follow(pulled_x_, (touch_.x_mm - place_zero_.x) / PULLED_x_mm);
+  follow(pulled_y_, (touch_.y_mm - place_zero_.y) / (PULLED_y_mm * std::min(LONG_mm / std::max(touch_.sigma_mm, 1.0), 1.0)));
+}
+
+void GripPlaceLoad::take(double now_s, double to_x, double to_y, double sticks) {
+  if (now_s <= t_s) {
+    return;
+  }
+  const double passed_s = now_s - t_s, share = std::min(passed_s / PULLS_s, 1.0);
+  t_s = now_s;
+  x = to_x - slid_x, y = to_y - slid_y;
+  const double slid = std::max(1.0 - sticks / std::max(std::hypot(x, y), 1e-9), 0.0);
+  speed_mm_s += share * (slid * std::hypot(x * PULLED_x_mm, y * PULLED_y_mm) / passed_s - speed_mm_s);
+  slid_x += slid * x, slid_y += slid * y;
+  x *= 1.0 - slid, y *= 1.0 - slid;
 }
 
 bool GripFinger::has_load() const { return (touch_.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0 && (touch_.flags & FORCE_ONLY) == 0; }
@@ -122,26 +167,63 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
   reading.force_N = force_N_;
   reading.sd_N = sd_N_;
   reading.has_load = reading.contact && has_load();
-  bool recoils = false; // moves against its load
+  const bool has_place = touch_.t_s < place_t_s_ + settings.stale_s && (place_zero_.is_known || !is_zeroed_);
+  reading.by_place = reading.contact && !reading.has_load && has_place;
   if (reading.has_load) {
     reading.load_x_N = touch_.qx_N - load_zero_.x;
     reading.load_y_N = touch_.qy_N - load_zero_.y;
-    reading.load_N = std::hypot(reading.load_x_N, reading.load_y_N);
     reading.load_sd_N = std::max(touch_.q_sd_N, LOAD_SD_LEAST_N);
     reading.speed_mm_s = std::hypot(touch_.speed_x_mm_s, touch_.speed_y_mm_s);
-    recoils = reading.load_N > SHARED_N && touch_.speed_x_mm_s * reading.load_x_N + touch_.speed_y_mm_s * reading.load_y_N < 0.0;
+  } else if (reading.by_place) {
+    reading.pulled_x = pulled_x_;
+    reading.pulled_y = pulled_y_;
   }
-  reading.has_place = reading.contact && touch_.t_s < place_t_s_ + settings.stale_s && (place_zero_.is_known || !is_zeroed_);
-  reading.pulled = reading.has_place ? pulled_ : 0.0;
-  // Eq. (7) mistakes a tangential force for a slide, so it counts only if there is no other evidence, and no friction
-  // explains how far the contact has moved.
-  const std::uint32_t slide = reading.has_load ? CONTACT_FLAG_SLIDING : CONTACT_FLAG_SLIP;
-  const bool is_held = reading.has_load ? recoils : reading.has_place && pulled_ <= settings.friction;
-  reading.slides = reading.contact && (touch_.flags & slide) != 0 && !is_held;
+  reading.load_N = std::hypot(reading.load_x_N, reading.load_y_N);
+  // Moves against its load.
+  const bool recoils = reading.load_N > SHARED_N && touch_.speed_x_mm_s * reading.load_x_N + touch_.speed_y_mm_s * reading.load_y_N < 0.0;
+  // What carries no load does not slide, whatever the rubber does.
+  reading.slides = reading.contact && reading.has_load && (touch_.flags & CONTACT_FLAG_SLIDING) != 0 && !recoils &&
+                   reading.load_N > SURE_SDS * reading.load_sd_N;
   return reading;
 }
 
 using Readings = std::array<GripReading, GRIP_FINGERS>;
+
+// Where no fingertip has a load, and each contact a place. What both places have in common is the load: an object that tilts moves them
+// apart.
+static void load_by_place(Readings &readings, const GripSettings &settings, GripPlaceLoad &place) {
+  double t_s = 0.0, force_N = 0.0, x = 0.0, y = 0.0, most = 0.0;
+  for (GripReading &reading : readings) {
+    if (reading.has_load || (reading.contact && !reading.by_place)) {
+      return;
+    }
+    reading.by_place = reading.by_place && reading.has_force;
+    if (reading.by_place) {
+      reading.pulled_x *= &reading == readings.data() ? 1.0 : -1.0;
+      t_s = std::max(t_s, reading.t_s);
+      force_N += reading.force_N;
+      x += reading.force_N * reading.pulled_x;
+      y += reading.force_N * reading.pulled_y;
+      most = std::max(most, place.alone(reading.pulled_x, reading.pulled_y));
+    }
+  }
+  if (!(force_N > 0.0)) {
+    return;
+  }
+  place.take(t_s, x / force_N, y / force_N, std::min(settings.friction, PLACE_STICKS));
+  const double pulled = std::max(std::hypot(place.x, place.y), ALONE * most);
+  for (GripReading &reading : readings) {
+    if (reading.by_place) {
+      reading.has_load = true;
+      reading.load_x_N = place.x * reading.force_N;
+      reading.load_y_N = place.y * reading.force_N;
+      reading.load_N = pulled * reading.force_N;
+      reading.load_sd_N = std::max(PLACE_SD * reading.load_N, LOAD_SD_LEAST_N);
+      reading.speed_mm_s = place.speed_mm_s;
+      reading.slides = reading.speed_mm_s > SLIDES_mm_s;
+    }
+  }
+}
 
 // Replaces a reading that is doubted by the last one that was believed, or leaves the fingertip out.
 static void judge(std::array<GripFinger, GRIP_FINGERS> &fingers, Readings &readings, const GripSettings &settings, const GripReach &reach) {
@@ -182,11 +264,12 @@ static void judge(std::array<GripFinger, GRIP_FINGERS> &fingers, Readings &readi
 }
 
 GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s, const GripSettings &settings,
-                              const GripReach *held) {
+                              const GripReach *held, GripPlaceLoad &place) {
   Readings readings;
   for (std::size_t i = 0; i < fingers.size(); i++) {
     readings[i] = fingers[i].sample(now_s, settings);
   }
+  load_by_place(readings, settings, place);
   if (held != nullptr) {
     judge(fingers, readings, settings, *held);
   } else {
@@ -196,7 +279,7 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   }
   GripReadings all;
   all.low_N = all.t_s = all.speed_mm_s = std::numeric_limits<double>::infinity();
-  double loads_N = 0.0, most_N = 0.0, normal_N = 0.0, most_pull_N = 0.0, least_pull_N = all.low_N;
+  double loads_N = 0.0, most_N = 0.0, normal_N = 0.0;
   int loads = 0, marked = 0;
   for (std::size_t i = 0; i < fingers.size(); i++) {
     const GripReading &reading = readings[i];
@@ -221,13 +304,9 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
       all.sd_N = std::max(all.sd_N, reading.sd_N);
       all.t_s = std::min(all.t_s, reading.t_s);
     }
-    all.has_place = all.has_place && (reading.has_place || !reading.contact);
-    if (reading.contact) {
-      least_pull_N = std::min(least_pull_N, reading.pulled * reading.force_N);
-      most_pull_N = std::max(most_pull_N, reading.pulled * reading.force_N);
-    }
     if (reading.has_load) {
       loads++;
+      all.by_place = reading.by_place;
       loads_N += reading.load_N;
       all.load_sd_N = std::max(all.load_sd_N, reading.load_sd_N);
       normal_N += reading.force_N;
@@ -243,8 +322,6 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   }
   // An object in the air presses on both alike, so the mean is the better estimate. The further they differ, the less is believed.
   all.grip_N = std::max(all.low_N, all.mean_N - std::max(all.high_N - all.low_N - settings.differ * all.high_N, 0.0));
-  // One fingertip alone is not believed to carry more than two thirds.
-  all.place_N = std::min(2.0 * least_pull_N, most_pull_N);
   all.has_load = loads > 0;
   if (loads > 0) {
     // Both share the load; if one carries far more, that one slides first.

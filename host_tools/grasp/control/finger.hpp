@@ -13,6 +13,9 @@ namespace fingertip {
 
 constexpr std::size_t GRIP_FINGERS = 2;
 
+// Assumed friction of a contact whose load shows by its place alone: what has moved further has slid, and its zero with it.
+constexpr double PLACE_FRICTION = 0.2, PLACE_STICKS = 1.3 * PLACE_FRICTION;
+
 // One frame of a fingertip. A value whose VALID flag is off is 0.
 struct GripTouch {
   double t_s = 0.0;        // when it was measured
@@ -37,8 +40,8 @@ struct GripReading {
   double t_s = 0.0;         // time of the measured force
   double load_x_N = 0.0, load_y_N = 0.0;
   double force_N = 0.0, sd_N = 0.0, load_N = 0.0, load_sd_N = 0.0, speed_mm_s = 0.0;
-  bool has_place = false;
-  double pulled = 0.0; // tangential over normal force, by how far the place has moved since end_zero; 0 before
+  double pulled_x = 0.0, pulled_y = 0.0; // by_place: tangential over normal force, were it this fingertip's alone
+  bool by_place = false;                 // the load, by how far the contact has moved since end_zero; 0 before
 };
 
 class GripReach;
@@ -96,8 +99,9 @@ public:
 
 private:
   bool has_load() const;
+  void follow_place();
 
-  GripTouch touch_;
+  GripTouch came_, touch_; // as it came, and what the pad bears of it
   bool is_heard_ = false, is_new_ = false, has_delay_ = false;
   double heard_s_ = 0.0, changed_s_ = 0.0, force_s_ = 0.0; // arrival of a frame, a change, a force
   double delay_s_ = 0.0;
@@ -118,8 +122,17 @@ private:
     }
   };
   Zero load_zero_, place_zero_;
-  double place_t_s_ = -1.0, pulled_ = 0.0;
-  bool is_zeroed_ = false; // end_zero since begin_zero
+  double place_t_s_ = -1.0;
+  double pulled_x_ = 0.0, pulled_y_ = 0.0; // tangential over normal force, by the place
+  bool is_zeroed_ = false;                 // end_zero since begin_zero
+};
+
+// Tangential over normal force by how far the contacts have moved. What has moved further than friction holds has slid.
+struct GripPlaceLoad {
+  void take(double t_s, double to_x, double to_y, double sticks);
+  double alone(double to_x, double to_y) const { return std::hypot(to_x - slid_x, to_y - slid_y); } // of one place
+  double t_s = 0.0, x = 0.0, y = 0.0, slid_x = 0.0, slid_y = 0.0;
+  double speed_mm_s = 0.0; // of a slide
 };
 
 // The combined reading of both fingertips; a reading that is not trusted is left out.
@@ -134,8 +147,7 @@ struct GripReadings {
   double load_N = 0.0; // tangential force at one fingertip, less its zero
   double load_sd_N = 0.0;
   double keeps = 1.0, pull_N = 0.0; // GripFinger::mark: the most and the least of the marked fingertips; of none: all, and 0
-  bool has_place = true;            // of all that have contact
-  double place_N = 0.0;             // tangential force by GripReading::pulled
+  bool by_place = false;            // the load
   double ratio = 0.0;               // tangential over normal force, of the fingertips that have both
   double speed_mm_s = 0.0;          // sliding speed at the slower fingertip
   std::array<double, GRIP_FINGERS> force_N{};
@@ -144,6 +156,6 @@ struct GripReadings {
 
 // held: what moves an object that both fingertips hold; none: their forces are believed as they come.
 GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, double now_s, const GripSettings &settings,
-                              const GripReach *held);
+                              const GripReach *held, GripPlaceLoad &place);
 
 } // namespace fingertip

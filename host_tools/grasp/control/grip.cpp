@@ -29,7 +29,6 @@ constexpr double APPROACH_LEAST_mm_s = 1.0;
 constexpr double MOVE_s = 0.02;        // duration of a move, unless the object slides
 constexpr double WIDTH_SLACK_mm = 1.0; // rounding of the gripper's own units
 constexpr double MARGIN_MOST = 100.0;
-constexpr double ONLY_HELD_s = 1.0; // without a load for this time
 
 Grip::Grip(const GripSettings &settings, const GripperTraits &traits) : settings_(settings), traits_(traits), reach_(traits) {}
 
@@ -194,11 +193,9 @@ std::uint32_t Grip::squeeze() {
   const bool nearest = !fixed && readings_.fingers > 0 && reach_.has_come(now_s_, readings_.t_s);
   const bool there = (readings_.low_N >= SQUEEZED * aimed_N || nearest) && risen_N >= aimed_N;
   const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, readings_.t_s);
-  // A detour brings it one step nearer: to a set force, or if the grip is far too weak.
-  const bool may_detour = nearest && (capped || there);
-  if (may_detour &&
-      (settings_.sets_force() ? reach_.start_detour_to(settings_.start_N, readings_, settings_, now_s_)
-                              : readings_.low_N < SQUEEZED * aimed_N && reach_.start_detour_closer(readings_, settings_, now_s_))) {
+  // A detour brings a grip that is far too weak one step nearer.
+  if (nearest && (capped || there) && !settings_.sets_force() && readings_.low_N < SQUEEZED * aimed_N &&
+      reach_.start_detour(readings_, settings_, now_s_)) {
     enter(GRIP_APPROACH);
     return trouble;
   }
@@ -210,7 +207,7 @@ std::uint32_t Grip::squeeze() {
     return trouble;
   }
   if (!alone && (((there || capped) && !status_.moving) || over)) {
-    if (!fixed && !is_blind_ && !readings_.has_load && !readings_.has_place) {
+    if (!fixed && !is_blind_ && !readings_.has_load) {
       is_blind_ = true; // squeeze on to the grip that holds without a load
       since_s_ = now_s_;
     } else {
@@ -230,6 +227,7 @@ std::uint32_t Grip::make_ready() {
     for (GripFinger &finger : fingers_) {
       finger.end_zero();
     }
+    place_ = {};
     hold_.begin();
     enter(GRIP_HOLDING);
   }
@@ -252,18 +250,8 @@ std::uint32_t Grip::hold() {
   const double wanted_N = hold_.wants(readings_, reach_.coming_N(readings_, now_s_), settings_, now_s_, dead_s());
   const bool slides = hold_.is_sliding();
   std::uint32_t trouble = readings_.has_load ? 0u : GRIP_NO_LOAD;
-  // After the rubber has relaxed, a detour brings the grip nearer to a set force. Without a measured
-  // load the object may have been lifted, so there is no detour then.
-  const bool only_held = hold_.is_set() && readings_.has_load && now_s_ - since_s_ > ONLY_HELD_s;
-  if (!only_held) {
-    reach_.cancel_detour();
-  }
-  if (reach_.is_in_detour()) {
-    reach_.continue_detour(now_s_, readings_.t_s);
-  } else if (!only_held || !reach_.start_detour_to(settings_.start_N, readings_, settings_, now_s_)) {
-    const bool opens = readings_.has_load || hold_.is_set() || readings_.high_N > settings_.cap_N;
-    trouble |= aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual, hold_.is_set(), opens});
-  }
+  const bool opens = readings_.has_load || hold_.is_set() || readings_.high_N > settings_.cap_N;
+  trouble |= aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual, hold_.is_set(), opens});
   if (slides != (state_ == GRIP_SLIPPING)) {
     enter(slides ? GRIP_SLIPPING : holds_);
   }
@@ -316,7 +304,7 @@ std::uint32_t Grip::go_on() {
 
 void Grip::sample() {
   const bool held = was_held_ && is_grasping();
-  readings_ = combine_readings(fingers_, now_s_, settings_, held ? &reach_ : nullptr);
+  readings_ = combine_readings(fingers_, now_s_, settings_, held ? &reach_ : nullptr, place_);
   trouble_ = readings_.trouble | gripper_trouble();
   // The frames of the two are not simultaneous, so the forces always differ while they change.
   const bool uneven = readings_.fingers == 2 && readings_.high_N > 4.0 * settings_.touch_N &&

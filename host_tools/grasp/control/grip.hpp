@@ -82,6 +82,7 @@ private:
   GripSettings settings_;
   GripperTraits traits_;
   std::array<GripFinger, GRIP_FINGERS> fingers_;
+  GripPlaceLoad place_;
   GripReadings readings_;
   GripReach reach_;
   GripHold hold_;

@@ -30,6 +30,8 @@ constexpr double FALLS_s = 0.06;
 // The load of an object that slides and does not slow down is its friction plus the force that stops
 // it within STOPS_s. The estimate follows with the time constant FOLLOWS_s.
 constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
+// A load by the place changes a little with the grip: the grip loosens to this share of what is needed.
+constexpr double PLACE_LOOSENS = 1.25;
 // Friction falls by less than this factor as a slide begins.
 constexpr double GROWN = 1.4;
 
@@ -74,6 +76,11 @@ void GripLoad::slides_at(double load_N, double speed_mm_s, double passed_s) {
 
 void GripHold::begin() { *this = GripHold(); }
 
+double GripHold::friction(const GripSettings &settings) const {
+  const double known = friction_.value(settings.friction);
+  return by_place_ ? std::min(known, PLACE_FRICTION) : known;
+}
+
 double GripHold::need_N(const GripSettings &settings, double delay_s, double dead_s) const {
   const double load_N = sliding_ ? load_.now_N() : std::max({load_.ahead_N(dead_s), was_N_, settings.expected_N(was_loaded_)});
   const double margin = settings.margin + MARGIN_1_s * late_s(delay_s);
@@ -83,6 +90,7 @@ double GripHold::need_N(const GripSettings &settings, double delay_s, double dea
 void GripHold::update(const GripReadings &readings, const GripSettings &settings, double now_s) {
   const double passed_s = std::clamp(now_s - updated_s_, 0.0, 0.1);
   updated_s_ = now_s;
+  by_place_ = readings.has_load ? readings.by_place : by_place_;
   still_s_ = readings.slides ? still_s_ : now_s;
   moved_mm_ = readings.slides ? moved_mm_ + readings.speed_mm_s * passed_s : 0.0;
   // The largest speed within LATELY_s: a slower slide slows down.
@@ -92,20 +100,19 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
   const bool creeps = readings.speed_mm_s < CREEPS_mm_s && now_s - still_s_ < CREEPS_s;
   const bool holds = moved_mm_ < FAR_mm && readings.load_N < BEGINS_AT * lately_ * readings.grip_N;
   const bool was_sliding = sliding_;
-  sliding_ = readings.slides && (was_sliding || !readings.has_load || !(holds || creeps));
-  goes_on_ = sliding_ && (!readings.has_load || (!holds && readings.speed_mm_s >= fastest_mm_s_));
+  sliding_ = readings.slides && (was_sliding || !(holds || creeps));
+  goes_on_ = sliding_ && !holds && readings.speed_mm_s >= fastest_mm_s_;
   if (sliding_) {
     slides_ += was_sliding ? 0 : 1;
     slid_s_ = now_s;
-    if (goes_on_ && readings.has_load) {
+    if (goes_on_) {
       lately_ = std::max(lately_, readings.ratio);
-      friction_.slid(readings.ratio, lately_);
+      readings.by_place ? void() : friction_.slid(readings.ratio, lately_);
       load_.slides_at(readings.load_N, readings.speed_mm_s, passed_s);
     }
     return;
   }
   friction_.rests();
-  place_.rests(readings.place_N, 0.0, passed_s, false);
   if (!readings.has_load) {
     return;
   }
@@ -115,7 +122,7 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
   ratio_ += std::min(passed_s / HELD_s, 1.0) * (readings.ratio - ratio_);
   if (readings.grip_N > 2.0 * settings.touch_N) {
     lately_ = std::max(lately_, readings.ratio);
-    readings.slides ? void() : friction_.held(ratio_);
+    readings.slides || readings.by_place ? void() : friction_.held(ratio_);
   }
   steady_s_ = load_.now_N() > LOADED_N && load_.is_steady() ? steady_s_ : now_s;
   was_loaded_ = was_loaded_ || now_s - steady_s_ > LOADED_s;
@@ -133,14 +140,10 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
     update(readings, settings, now_s);
   }
   const double late_N = settings.sets_force() ? 0.0 : FLOOR_N_s * late_s(readings.delay_s);
-  const double least_known_N = settings.mass_kg > 0.0 ? settings.first_N() : settings.floor_N + late_N;
-  const double by_place_N = std::max(settings.margin * place_.ahead_N(dead_s) / settings.friction, least_known_N);
-  const double blind_N = readings.has_place ? std::min(by_place_N, settings.unseen_N()) : settings.unseen_N();
-  const double least_N = !has_seen_load_ && !readings.has_load ? blind_N : was_loaded_ ? settings.floor_N + late_N : settings.first_N();
+  const double least_N = !has_seen_load_ && !readings.has_load ? settings.unseen_N()
+                         : was_loaded_                         ? settings.floor_N + late_N
+                                                               : settings.first_N();
   double need = std::max(need_N(settings, readings.delay_s, dead_s), least_N);
-  if (goes_on_ && !readings.has_load) {
-    need = std::max(need, GROWN * settings.margin * readings.grip_N);
-  }
   need = std::min(need, settings.cap_N);
   is_set_ = settings.sets_force() && need == least_N && !is_loaded() && slides_ == 0;
   // A force that was wanted and is not under way is given up: the load that it was for has not come.
@@ -149,12 +152,9 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
     // The present grip decays slowly.
     const bool rests = !readings.slides && (slides_ == 0 || now_s - slid_s_ > settings.rest_s);
     const double share = rests ? 1.0 - std::exp(-settings.decay_1_s * passed_s) : 0.0;
-    wanted_N_ -= share * std::max(wanted_N_ - need, 0.0);
+    wanted_N_ -= share * std::max(wanted_N_ - (by_place_ ? PLACE_LOOSENS : 1.0) * need, 0.0);
   }
-  // By the place alone nothing opens the gripper, so what was wanted before does not count, unless the object slides on.
-  const bool by_place = readings.has_place && !readings.has_load && !has_seen_load_ && !goes_on_;
-  wanted_N_ = by_place ? need : std::max(wanted_N_, need);
-  return wanted_N_;
+  return wanted_N_ = std::max(wanted_N_, need);
 }
 
 } // namespace fingertip

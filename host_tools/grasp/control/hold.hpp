@@ -45,7 +45,7 @@ public:
   void begin();
   // The wanted force. coming_N: the grip after the moves under way. dead_s: from a motion of the object to the motion of the gripper.
   double wants(const GripReadings &readings, double coming_N, const GripSettings &settings, double now_s, double dead_s);
-  double friction(const GripSettings &settings) const { return friction_.value(settings.friction); }
+  double friction(const GripSettings &settings) const;
   bool is_set() const { return is_set_; } // a set force without a load
   double load_N() const { return load_.now_N(); }
   bool is_loaded() const { return load_.now_N() > LOADED_N; } // enough for a margin to have a meaning
@@ -60,7 +60,7 @@ private:
   double need_N(const GripSettings &settings, double delay_s, double dead_s) const;
 
   GripFriction friction_;
-  GripLoad load_, place_; // the latter by how far the contact has moved
+  GripLoad load_;
   double wanted_N_ = 0.0;
   double now_s_ = 0.0, updated_s_ = 0.0;
   double slid_s_ = 0.0; // time of the last frame of a slide
@@ -72,6 +72,7 @@ private:
   double lately_ = 0.0;   // largest ratio within LATELY_s
   double moved_mm_ = 0.0; // length of the present reported slide
   bool begun_ = false, sliding_ = false, goes_on_ = false, has_seen_load_ = false, was_loaded_ = false, is_set_ = false;
+  bool by_place_ = false; // the latest load
   std::uint32_t slides_ = 0;
 };
 

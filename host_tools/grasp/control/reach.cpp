@@ -27,10 +27,8 @@ constexpr double NEAR = 0.03;          // error that is near enough, as a share 
 constexpr double WEAK = 0.8;           // a grip below this share of it is too weak
 constexpr double SHORT_mm = 0.5;       // length of a short move
 constexpr double OPENS_mm = 0.3;       // largest single opening
-// A set force may be off by OFF steps: more than half a step, or the gripper would oscillate. During
-// a detour the grip keeps the share KEEPS of it. A grasp has DETOURS_MOST detours at most.
-constexpr double OFF = 0.65, KEEPS = 0.25;
-constexpr int DETOURS_MOST = 4;
+// A set force may be off by so many steps: more than half a step, or the gripper would oscillate.
+constexpr double OFF = 0.65;
 // Distance from the cap in standard deviations of a fingertip's force; the deviation is limited to
 // these shares of the force, because UNCERTAIN contacts report far more than the true error. Chosen
 // with simulated cylinders, whose forces are reported with the largest errors.
@@ -177,36 +175,16 @@ double GripReach::travel_below_cap_mm(const GripReadings &readings, const GripSe
   return coming_mm - bound_.width_below(settings.cap_N, most_N(readings), width_at(readings.t_s));
 }
 
-void GripReach::begin_detour(double to_mm, double now_s) {
-  in_detour_ = true;
-  detour_end_mm_ = to_mm;
-  target_mm_ = std::max(coming_mm(now_s), to_mm) + least_mm();
-  aimed_s_ = now_s;
-}
-
-bool GripReach::start_detour_closer(const GripReadings &readings, const GripSettings &settings, double now_s) {
+bool GripReach::start_detour(const GripReadings &readings, const GripSettings &settings, double now_s) {
   const double coming = coming_mm(now_s);
-  const bool goes = !limits_itself(settings) && can_detour(readings) && travel_below_cap_mm(readings, settings, coming) > traits_.step_mm;
-  if (goes) {
-    begin_detour(coming - traits_.step_mm, now_s);
-  }
-  return goes;
-}
-
-bool GripReach::start_detour_to(double set_N, const GripReadings &readings, const GripSettings &settings, double now_s) {
-  if (!can_detour(readings) || detours_ >= DETOURS_MOST || !rests(now_s, readings.t_s)) {
+  const bool can = least_mm() > traits_.step_mm && !readings.is_alone() && !readings.over && !limits_itself(settings);
+  if (!can || travel_below_cap_mm(readings, settings, coming) <= traits_.step_mm) {
     return false;
   }
-  const double coming = coming_mm(now_s), width_mm = width_at(readings.t_s);
-  const double off = steps_off(set_N, readings.low_N, width_mm, coming);
-  const double to_mm = coming - std::copysign(traits_.step_mm, off);
-  const double widest_mm = std::max(coming, to_mm) + least_mm();
-  const bool stays_below_cap = off < 0.0 || travel_below_cap_mm(readings, settings, coming) > traits_.step_mm;
-  if (std::abs(off) < OFF || !stays_below_cap || rubber_.force_at(widest_mm, readings.low_N, width_mm) < KEEPS * set_N) {
-    return false;
-  }
-  detours_++;
-  begin_detour(to_mm, now_s);
+  in_detour_ = true;
+  detour_end_mm_ = coming - traits_.step_mm;
+  target_mm_ = coming + least_mm();
+  aimed_s_ = now_s;
   return true;
 }
 
@@ -222,16 +200,14 @@ bool GripReach::continue_detour(double now_s, double frame_s) {
   return !in_detour_;
 }
 
-// Whole steps to the position whose force is nearest. A distance below the least move is left to a
-// detour; if that is not possible, the least move is made when it reduces the error.
-double GripReach::nearest_steps(double off, double least_mm, bool may_detour) const {
+// Whole steps to the position whose force is nearest. The least move is made when it reduces the error.
+double GripReach::nearest_steps(double off, double least_mm) const {
   const double least = std::round(least_mm / traits_.step_mm);
   const double steps = std::abs(off) > OFF ? std::round(off) : 0.0;
   if (std::abs(steps) >= least) {
     return steps;
   }
-  const bool worth = std::abs(off) > 0.5 * least + OFF - 0.5;
-  return worth && !(may_detour && detours_ < DETOURS_MOST) ? std::copysign(least, off) : 0.0;
+  return std::abs(off) > 0.5 * least + OFF - 0.5 ? std::copysign(least, off) : 0.0;
 }
 
 void GripReach::learn(const GripReadings &readings, const GripSettings &settings, double now_s) {
@@ -267,9 +243,8 @@ GripReach::Outlook GripReach::predict(const GripAim &aim, const GripReadings &re
   const bool waits = !outlook.come && (target_mm_ > outlook.width_mm || readings.slides);
   const double least_N = force_at(outlook, outlook.coming_mm - outlook.least_mm) - outlook.coming_N;
   outlook.misses_N = outlook.exact ? outlook.near_N : std::max(outlook.near_N, (waits ? 1.0 : MISSES) * least_N);
-  const bool may_detour = readings.has_load || aim.haste == Haste::patient;
   if (std::abs(outlook.coming_N - aim.wanted_N) > outlook.near_N) {
-    outlook.nearest_steps = nearest_steps(steps_to(outlook, aim.wanted_N), outlook.least_mm, may_detour);
+    outlook.nearest_steps = nearest_steps(steps_to(outlook, aim.wanted_N), outlook.least_mm);
   }
   return outlook;
 }

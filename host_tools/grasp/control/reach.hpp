@@ -113,7 +113,6 @@ public:
   void first_touch(double t_s) {
     rubber_.begin(width_at(t_s));
     bound_ = GripBound();
-    detours_ = 0;
   }
   void both_touch(double t_s) { rubber_.both_touch(width_at(t_s)); }
   void approach_ends(double now_s) { aimed_s_ = now_s; } // the gripper is still moving
@@ -137,13 +136,10 @@ public:
   // Sends the gripper to the width of the wanted force. Returns the caps that prevent it.
   std::uint32_t aim(const GripAim &aim, const GripReadings &readings, const GripSettings &settings, double now_s);
 
-  // Detour: a gripper whose least move is several steps moves by a single step in two moves, back and on again. Only while there is no
-  // load. Both return true if a detour begins. One step closer, if only the fingertips keep the cap and one step stays below it.
-  bool start_detour_closer(const GripReadings &readings, const GripSettings &settings, double now_s);
-  // One step in either direction, if that is nearer to this force. On the way the grip keeps a share of it.
-  bool start_detour_to(double set_N, const GripReadings &readings, const GripSettings &settings, double now_s);
+  // Detour: a gripper whose least move is several steps comes one step closer by two moves, back and on again. Only before anything is
+  // lifted. True: it begins, as only the fingertips keep the cap and one step stays below it.
+  bool start_detour(const GripReadings &readings, const GripSettings &settings, double now_s);
   bool is_in_detour() const { return in_detour_; }
-  void cancel_detour() { in_detour_ = false; }
   // Continues the detour; true once the gripper is at its end.
   bool continue_detour(double now_s, double frame_s);
 
@@ -157,10 +153,8 @@ private:
   double steps_off(double wanted_N, double force_N, double from_mm, double coming_mm) const {
     return (coming_mm - rubber_.width_for(wanted_N, force_N, from_mm)) / traits_.step_mm;
   }
-  bool can_detour(const GripReadings &readings) const { return least_mm() > traits_.step_mm && !readings.is_alone() && !readings.over; }
-  void begin_detour(double to_mm, double now_s);
   double travel_below_cap_mm(const GripReadings &readings, const GripSettings &settings, double coming_mm) const;
-  double nearest_steps(double off, double least_mm, bool may_detour) const;
+  double nearest_steps(double off, double least_mm) const;
 
   // What one call of aim() decides by.
   struct Outlook {
@@ -197,7 +191,6 @@ private:
   double stopped_s_ = 0.0; // time of the first answer without motion since the last move
   bool in_detour_ = false;
   double detour_end_mm_ = 0.0;
-  int detours_ = 0;
   struct Width {
     double t_s, width_mm;
   };

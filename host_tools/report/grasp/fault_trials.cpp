@@ -158,22 +158,22 @@ void expect(FaultTrial &one) {
   }
 }
 
-KindOutcome outcome_of(const FaultTrial &one, const KindTrial &trial) {
+KindOutcome outcome_of(const Face &face, const FaultTrial &one, const KindTrial &trial) {
   const GripperTraits &traits = trial.gripper.traits;
   CoreController controller(settings_for(traits, {{"cap", one.thing.cap_N}}), traits);
-  return run_kind(trial, controller);
+  return run_kind(trial, face, controller);
 }
 
 // The same without the fault, which decides how far it may open.
-double may_open_mm(const FaultTrial &one) {
+double may_open_mm(const Face &face, const FaultTrial &one) {
   KindTrial sound = one.trial;
   sound.fault->lasts_s = 0.0;
-  return outcome_of(one, sound).failed.opened_mm + OPENS_mm;
+  return outcome_of(face, one, sound).failed.opened_mm + OPENS_mm;
 }
 
-nlohmann::ordered_json row_of(const FaultTrial &one, double may_open_mm) {
+nlohmann::ordered_json row_of(const Face &face, const FaultTrial &one, double may_open_mm) {
   const double cap_N = one.thing.cap_N;
-  const KindOutcome outcome = outcome_of(one, one.trial);
+  const KindOutcome outcome = outcome_of(face, one, one.trial);
   const Failed &failed = outcome.failed;
   const bool ends = one.ends_in.empty() || std::find(one.ends_in.begin(), one.ends_in.end(), failed.state) != one.ends_in.end();
   const bool reports = (failed.trouble & one.all_of) == one.all_of && (one.any_of == 0 || (failed.trouble & one.any_of) != 0) &&
@@ -197,7 +197,7 @@ nlohmann::ordered_json row_of(const FaultTrial &one, double may_open_mm) {
 
 } // namespace
 
-nlohmann::ordered_json fault_rows(std::uint64_t jobs) {
+nlohmann::ordered_json fault_rows(const Face &face, std::uint64_t jobs) {
   std::vector<FaultTrial> all;
   std::uint64_t grasps = 0;
   std::map<GripperDriver, std::string> models; // one of each: what fails is a line's and a drive's, not a stroke's
@@ -217,10 +217,10 @@ nlohmann::ordered_json fault_rows(std::uint64_t jobs) {
   }
   std::vector<double> may_open(grasps);
   twin::in_parallel(
-      grasps, [&](std::size_t i) { may_open[i] = may_open_mm(all[i * std::size(HAPPENINGS)]); }, jobs);
+      grasps, [&](std::size_t i) { may_open[i] = may_open_mm(face, all[i * std::size(HAPPENINGS)]); }, jobs);
   std::vector<nlohmann::ordered_json> rows(all.size());
   twin::in_parallel(
-      all.size(), [&](std::size_t i) { rows[i] = row_of(all[i], may_open[i / std::size(HAPPENINGS)]); }, jobs);
+      all.size(), [&](std::size_t i) { rows[i] = row_of(face, all[i], may_open[i / std::size(HAPPENINGS)]); }, jobs);
   return rows;
 }
 

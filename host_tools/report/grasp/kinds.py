@@ -28,14 +28,11 @@ ROWS = {
     "slick": (("--kind", "slick"), True),
     "fragile": (("--kind", "fragile"), True),
     "usual and rough, 40 ms later": ((*MIXED, "--later", "40"), False),
-    "usual and rough, half of the load reported": ((*MIXED, "--load", "0.5"), False),
-    "usual and rough, no load reported": ((*MIXED, "--load", "0"), False),
+    "usual and rough, no load estimated": ((*MIXED, "--loadless"), False),
     "usual and rough, 20 frames a second": ((*MIXED, "--rate", "20"), False),
     "usual and rough, 100 frames a second": ((*MIXED, "--rate", "100"), False),
     "usual and rough, 1308 frames a second": ((*MIXED, "--rate", "1308"), False),
-    "usual": (("--kind", "usual"), False),
-    "rough": (("--kind", "rough"), False),
-    "gentle": (("--kind", "gentle"), False),
+    **{kind: (("--kind", kind), False) for kind in ("usual", "rough", "gentle")},
 }
 STILL = ("--kind", "gentle", "--still")
 # row of a set force: its options, its controller

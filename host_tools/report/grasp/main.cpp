@@ -22,8 +22,7 @@ enum Stream : std::uint64_t { NOISE = 881, SET };
 
 constexpr double FIXED_N = 15.0, PAPER_N = 6.0;
 constexpr double SET_LEAST_N = 2.0, SET_MOST_N = 15.0; // of a still grasp
-constexpr double SENSORS_NOISE = 0.05;
-constexpr double STEADY_s = 1.5, WATCHED_s = 3.5; // before and after wrong readings
+constexpr double STEADY_s = 1.5, WATCHED_s = 3.5;      // before and after wrong readings
 
 // Wrong readings of one fingertip.
 struct Wrong {
@@ -38,10 +37,10 @@ constexpr Wrong WRONG[] = {
 
 struct Options {
   std::string kind = "usual", gripper = gripper_models().front().model, controller = "ours", settings, wrong;
-  double later_ms = 0.0, rate_Hz = 410.0, load_share = 1.0, still_s = 0.0, mass_share = 0.0;
+  double later_ms = 0.0, rate_Hz = 410.0, still_s = 0.0, mass_share = 0.0;
   std::uint64_t seed = 1, count = 100, jobs = 2;
   std::optional<std::uint64_t> trace;
-  bool faults = false;
+  bool faults = false, loadless = false;
 };
 
 KindTrial trial_of(const Options &options, std::uint64_t n) {
@@ -52,13 +51,12 @@ KindTrial trial_of(const Options &options, std::uint64_t n) {
   trial.seed = Random(options.seed, NOISE, n).next();
   trial.later_s = 1e-3 * options.later_ms;
   trial.rate_Hz = options.rate_Hz;
-  trial.load_share = options.load_share;
+  trial.estimates_load = !options.loadless;
   if (options.still_s > 0.0) {
     trial.still_s = options.still_s;
     trial.set_N = Random(options.seed, SET, n).log_uniform(SET_LEAST_N, SET_MOST_N);
     trial.set_of_smaller = options.controller != "paper";
     trial.grasp.table_friction = 0.0; // both pads press alike
-    trial.noise = SENSORS_NOISE;
   }
   for (const Wrong &wrong : WRONG) {
     if (options.wrong == wrong.name) {
@@ -101,6 +99,12 @@ GripSettings settings_with(const Options &options, const KindTrial &trial) {
   return settings;
 }
 
+// What the pads touch, under 12 mm of rubber.
+const Face &face() {
+  static const Face found("sphere15", LAYER_mm, FINGERTIP_TABLES);
+  return found;
+}
+
 struct Done {
   KindTrial trial;
   KindOutcome outcome;
@@ -113,7 +117,7 @@ Done run_one(const Options &options, std::uint64_t n, const KindTrace &trace = {
   const GripperTraits &traits = done.trial.gripper.traits;
   CoreController ours(done.settings, traits);
   Textbook textbook(traits);
-  done.outcome = run_kind(done.trial, options.controller == "textbook" ? static_cast<Controller &>(textbook) : ours, trace);
+  done.outcome = run_kind(done.trial, face(), options.controller == "textbook" ? static_cast<Controller &>(textbook) : ours, trace);
   return done;
 }
 
@@ -183,7 +187,7 @@ ordered_json measured(const Options &options) {
     return traced(options, *options.trace);
   }
   if (options.faults) {
-    return {{"rows", fault_rows(options.jobs)}};
+    return {{"rows", fault_rows(face(), options.jobs)}};
   }
   std::vector<Done> done(options.count);
   twin::in_parallel(
@@ -210,9 +214,7 @@ int run(int argc, char **argv) {
   };
   number("--later", options.later_ms, "MS", "All frames come later")->check(CLI::NonNegativeNumber);
   number("--rate", options.rate_Hz, "HZ", "Frames of a fingertip")->check(CLI::Range(1.0, 1600.0))->capture_default_str();
-  number("--load", options.load_share, "SHARE", "Share of the load that frames report; 0: they report none")
-      ->check(CLI::Range(0.0, 1.0))
-      ->capture_default_str();
+  app.add_flag("--loadless", options.loadless, "Fingertips do not know their pads: no tangential force");
   number("--still", options.still_s, "S", "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
       ->check(CLI::PositiveNumber);
   app.add_option("--wrong", options.wrong, "Instead of events: what one fingertip reports wrongly in a steady hold")

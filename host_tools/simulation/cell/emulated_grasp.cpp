@@ -9,7 +9,8 @@
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/names.hpp"
 #include "library/pad/profile.hpp"
-#include "simulation/cell/cell.hpp"
+#include "simulation/cell/calibrated.hpp"
+#include "simulation/cell/fingertip_cell_world.hpp"
 #include "simulation/cell/gripper_line.hpp"
 #include "simulation/cell/kind_trial.hpp"
 
@@ -45,7 +46,6 @@ constexpr int CLOCK_EXCHANGES = 8;
 constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 constexpr double MOVES_s = 2.5e-4; // between two samples of the gripper
-constexpr double LOST_N = 0.01;
 // Cast pads differ by 8 %, a calibration finds that to 1.2 %: the report's part truth.
 constexpr double PAD_SD = 0.08, CALIBRATION_SD = 0.012, FORCE_SCALE_SD = 0.05;
 constexpr double MORE_LOAD = 1.1, MORE_LOAD_N = 0.1;
@@ -56,15 +56,10 @@ class EmulatedFingertip {
 public:
   // random: of its sensors' gains and its calibration.
   EmulatedFingertip(const pad_profile &profile, Random random) {
-    calibration stored{};
-    stored.placements = 20;
-    stored.force_scale = 1.0F / profile.force_ratio;
-    stored.force_scale_sd = static_cast<float>(FORCE_SCALE_SD);
-    for (std::size_t k = 0; k < SENSORS; k++) {
-      gain_[k] = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
-      stored.sensors[k].gain = static_cast<float>(gain_[k] * (1.0 + CALIBRATION_SD * random.normal()));
-      stored.sensors[k].gain_sd = static_cast<float>(CALIBRATION_SD);
+    for (double &gain : gain_) {
+      gain = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
     }
+    const calibration stored = calibrated(gain_, CALIBRATION_SD, 1.0 / static_cast<double>(profile.force_ratio), FORCE_SCALE_SD, random);
     commands_ = {command_pad(profile), command_calibrate(stored, geometry.sensor_count)};
     commands_.insert(commands_.end(), CLOCK_EXCHANGES, command_stream(0));
     commands_.push_back(command_stream(WIRE_STREAM_CONTACT));
@@ -160,14 +155,10 @@ class EmulatedGrasp {
 public:
   // All must outlive it.
   EmulatedGrasp(const KindOfGrasp &grasp, const GripperMechanics &gripper, const Face &face, const pad_profile &profile)
-      : grasp_(grasp), face_(face), cell_(grasp),
-        gripper_(gripper, grasp.width_mm + grasp.opens_mm, Random(SEED, LINE, 0)), fingers_{
-                                                                                       EmulatedFingertip(profile, Random(SEED, PAD, 0)),
-                                                                                       EmulatedFingertip(profile, Random(SEED, PAD, 1))} {
-    gripper_.motion().blocked_at = [this](double width_mm, double force_N) {
-      return force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
-    };
-  }
+      : grasp_(grasp), gripper_(gripper, grasp.width_mm + grasp.opens_mm, Random(SEED, LINE, 0)),
+        world_({grasp, std::nullopt, {}, std::nullopt}, face, gripper_.motion()), fingers_{
+                                                                                      EmulatedFingertip(profile, Random(SEED, PAD, 0)),
+                                                                                      EmulatedFingertip(profile, Random(SEED, PAD, 1))} {}
 
   // What a board sent at this time, since the last run().
   void take(std::size_t finger, const Bytes &bytes, double arrived_s) {
@@ -212,16 +203,16 @@ public:
 
   Bytes to_send(std::size_t finger) { return fingers_[finger].to_send(std::llround(1e6 * t_s_)); }
   // The present pressures of the sensors.
-  Pressures sensed_Pa(std::size_t finger) const { return fingers_[finger].sensed_Pa(face_.base_Pa(cell_.patch(finger))); }
+  Pressures sensed_Pa(std::size_t finger) const { return fingers_[finger].sensed_Pa(world_.pressures_Pa(finger)); }
   bool over() const { return over_; }
 
   // What happened, and when, of the first slip after the lift, as report/grasp/emulated_grasp.py names it; null: never.
   // reported_by: "SLIDING", or "load" if a fingertip's load rose by a tenth and 0.1 N.
   ordered_json summary() const {
-    ordered_json out = {{"dropped", dropped_},          {"slid_mm", cell_.slid_mm()},  {"asked_s", to_us(asked_s_)},
-                        {"holding_s", to_us(holds_s_)}, {"lift_s", to_us(lift_s_)},    {"end_s", to_us(t_s_)},
-                        {"trouble", trouble_},          {"slips", slips_.slips.size()}};
-    out["slip"] = slips_.slips.empty() ? ordered_json(nullptr) : answer_to(slips_.slips.front());
+    ordered_json out = {
+        {"dropped", world_.is_dropped()}, {"slid_mm", world_.slid_mm()}, {"asked_s", to_us(asked_s_)}, {"holding_s", to_us(holds_s_)},
+        {"lift_s", to_us(lift_s_)},       {"end_s", to_us(t_s_)},        {"trouble", trouble_},        {"slips", world_.slips().size()}};
+    out["slip"] = world_.slips().empty() ? ordered_json(nullptr) : answer_to(world_.slips().front());
     for (std::size_t f = 0; f < fingers_.size(); f++) {
       out["fingers"].push_back({{"frames", frames_[f]}, {"loads", loads_[f]}}); // loads: frames that report one
       out["fingers"].back().update(fingers_[f].line_summary());
@@ -257,29 +248,16 @@ private:
     if (seconds <= 0.0) {
       return;
     }
-    if (lift_s_ == NEVER_s && t_s_ >= holds_s_ + grasp_.waits_s) {
+    if (t_s_ >= holds_s_ + grasp_.waits_s && world_.lift()) {
       lift_s_ = t_s_;
     }
-    const bool lifts = lift_s_ < NEVER_s;
     const double width_mm = gripper_.motion().width_mm();
-    gripper_.motion().step(seconds);
-    const KindOfGrasp::Inputs inputs = grasp_.inputs(lifts ? t_s_ + 0.5 * seconds - lift_s_ : -1.0);
-    const double moved_mm = gripper_.motion().width_mm();
-    cell_.run(seconds, moved_mm, inputs);
+    world_.advance(seconds);
     t_s_ = to_s;
-    if (moved_mm != width_mm) {
-      moved_.push_back({t_s_, moved_mm});
+    if (gripper_.motion().width_mm() != width_mm) {
+      moved_.push_back({t_s_, gripper_.motion().width_mm()});
     }
-    const double force_N = cell_.mean_N();
-    if (lifts) {
-      slips_.sample(t_s_, cell_.slips(), force_N, cell_.slid_mm());
-    }
-    const Vector way = cell_.way_mm();
-    dropped_ = std::hypot(way.x, way.y) >= DROP_mm || (lifts && !inputs.table && force_N < LOST_N);
-    over_ = dropped_ || (lifts && t_s_ - lift_s_ >= grasp_.ends_s);
-    if (over_) {
-      slips_.end();
-    }
+    over_ = world_.is_dropped() || t_s_ - lift_s_ >= grasp_.ends_s;
   }
 
   ordered_json answer_to(const Slip &slip) const {
@@ -319,18 +297,16 @@ private:
   }
 
   const KindOfGrasp &grasp_;
-  const Face &face_;
-  Cell cell_;
   GripperLine gripper_;
+  World world_;
   std::array<EmulatedFingertip, 2> fingers_;
   std::unique_ptr<CoreController> controller_; // none before both are ready
   std::deque<GripperLine::Answer> line_;
   GripCommand command_{};
   GripReport report_{};
-  Slips slips_;
   double t_s_ = 0.0, holds_s_ = NEVER_s, lift_s_ = NEVER_s, asked_s_ = 0.0;
   std::uint32_t trouble_ = 0;
-  bool over_ = false, dropped_ = false;
+  bool over_ = false;
   std::array<std::size_t, 2> frames_{}, loads_{}; // since both are ready
   std::vector<Report> reports_;
   std::vector<Change> commanded_, asked_, moved_;

@@ -7,6 +7,7 @@
 #include "libfingertip/served_port.hpp"
 #include "libfingertip/session.hpp"
 #include "library/pad/profile.hpp"
+#include "simulation/cell/calibrated.hpp"
 #include "simulation/player/native_fingertip.h"
 #include "tool/advice.hpp"
 
@@ -29,7 +30,7 @@ namespace {
 
 enum Stream : std::uint64_t { CALIBRATION = 841 };
 
-constexpr float FORCE_SCALE_SD = 0.02F; // of a calibration by a weight
+constexpr double FORCE_SCALE_SD = 0.02; // of a calibration by a weight
 constexpr std::uint64_t COMMAND_us = 100'000, SETTLED_us = 1'500'000;
 
 class Fingertip {
@@ -94,14 +95,7 @@ private:
 
   void calibrate(double sd) {
     Random random(finger_.seed, CALIBRATION, 0);
-    calibration stored{};
-    stored.date_s = 1767225600;
-    stored.placements = 20;
-    stored.force_scale = 1.0F / pad_.force_ratio;
-    stored.force_scale_sd = FORCE_SCALE_SD;
-    for (std::size_t k = 0; k < SENSORS; k++) {
-      stored.sensors[k] = {static_cast<float>(finger_.gain[k] * (1.0 + sd * random.normal())), static_cast<float>(sd), 0, 0, 0};
-    }
+    const calibration stored = calibrated(finger_.gain, sd, 1.0 / static_cast<double>(pad_.force_ratio), FORCE_SCALE_SD, random);
     order(command_calibrate(stored, geometry.sensor_count));
   }
 

@@ -134,6 +134,7 @@ void World::watch_object() {
   const bool in_the_air = lift_s_ && !grasp_.inputs(since_s).table;
   if (std::hypot(way.x, way.y) >= DROP_mm || (in_the_air && cell_.mean_N() < LOST_N)) {
     is_dropped_ = true;
+    slips_.end();
     is_there_ = false;
     events_.push_back("dropped");
   }

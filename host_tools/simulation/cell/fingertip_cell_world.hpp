@@ -53,6 +53,9 @@ public:
   double need_N(double since_lift_s) const { return grasp_.least_N(since_lift_s); }
   double time_s() const { return time_s_; }
   bool touched() const { return peak_N_ > TOUCHED_N; }
+  bool is_dropped() const { return is_dropped_; }
+  double slid_mm() const { return cell_.slid_mm(); }
+  const std::vector<Slip> &slips() const { return slips_.slips; } // once it is dropped all, else those that have ended
   // The columns of the truth, in order.
   static const char *columns() {
     return "world_s,width_mm,force_N,peak_N,load_N,least_N,slid_mm,way_mm,friction,lifted_mm,slips,"

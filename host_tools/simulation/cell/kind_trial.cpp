@@ -1,19 +1,23 @@
 #include "simulation/cell/kind_trial.hpp"
 
+#include "grasp/fingertip.hpp"
 #include "libfingertip/clock.hpp"
 #include "libfingertip/random.hpp"
+#include "library/pad/profile.hpp"
+#include "simulation/cell/calibrated.hpp"
 #include "simulation/cell/cell.hpp"
 #include "simulation/cell/gripper_line.hpp"
+#include "simulation/player/native_stages.h"
+#include "simulation/twin/effects.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
-#include "contact/motion.h"
-#include "contact/slip.h"
 }
 
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <memory>
 
 namespace fingertip::cell {
 namespace {
@@ -24,12 +28,9 @@ constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 // A frame takes its conversion, of which the middle is its time; then it is read, fitted and sent. The
 // stages of the emulated chip at 410 Hz add up to some 1.6 ms after the conversion.
 constexpr double CONVERSION_s = 2.3e-3, PROCESSING_s = 1.6e-3;
-constexpr double FORCE_NOISE = 0.004, FORCE_NOISE_N = 0.01, LOAD_NOISE_N = 0.015, PLACE_NOISE_mm = 0.012;
-constexpr double GATE_N = 0.05; // less is no contact
-// The twin's Gaussians on 12 mm of rubber: their sigma, and how far a tangential force as large as the normal one moves them.
-constexpr double POINT_mm = 6.0, LINE_mm = 7.2, AREA_mm = 14.0, PULLED = 0.55, PULLED_mm = 3.9;
-constexpr std::uint32_t SLIP_WINDOW_us = 100000;
-constexpr float SLIP_mm = 0.75F;
+constexpr double NOISE_Pa = 5.0, STARTS_s = 2.0; // of a sensor; until it has a zero
+// A calibration finds the gains of a cast pad to 1.2 %: the report's part truth.
+constexpr double CALIBRATION_SD = 0.012, FORCE_SCALE_SD = 0.02;
 constexpr double STEPS_s = 0.01, PATIENCE_s = 12.0, SAMPLED_s = 2e-3;
 constexpr double NEAR = 0.1, SETTLED_s = 0.5; // of a set force
 constexpr double APART_mm = 1e3, FREE_mm = 0.5, TOUCHED_N = 0.05, LOST_N = 0.01;
@@ -41,92 +42,56 @@ constexpr double HUNTS_s = 0.5;
 
 std::uint64_t in_us(double s) { return static_cast<std::uint64_t>(std::llround(1e6 * s)); }
 
-// The reports of one fingertip.
+// The reports of one fingertip: a pad with the errors of real ones, calibrated, and the firmware's own code.
 class Tip {
 public:
-  Tip(const KindTrial &trial, std::size_t finger)
-      : pad_(trial.grasp.pads[finger]), mirror_(finger == 0 ? 1.0 : -1.0), load_share_(trial.load_share),
-        sigma_mm_(sigma_of(trial.grasp.shape)), noise_(trial.noise), period_s_(1.0 / trial.rate_Hz), random_(trial.seed, TIP, finger),
-        next_s_(random_.uniform(0.0, period_s_)) {
-    settings_.force_scale = settings_.tangential_scale = 1.0F;
+  Tip(const KindTrial &trial, const Face &face, std::size_t finger)
+      : kind_(trial.grasp.pads[finger]), face_(face), period_s_(1.0 / trial.rate_Hz), random_(trial.seed, TIP, finger),
+        rubber_(twin::parse_effects("gain=8,memory,aftereffect"), SENSORS, LAYER_mm, AIR_Pa, random_.next()),
+        firmware_(nullptr, native_stages_free), base_Pa_(SENSORS), sensed_Pa_(SENSORS), next_s_(random_.uniform(0.0, period_s_)) {
+    const pad_profile profile = pad::profile_over_own_sensors({LAYER_mm, 0.0, false});
+    Pressures gain{};
+    std::transform(rubber_.gain_errors().begin(), rubber_.gain_errors().end(), gain.begin(), [](double error) { return 1.0 + error; });
+    const calibration stored =
+        calibrated(gain, CALIBRATION_SD, kind_.gain / static_cast<double>(profile.force_ratio), FORCE_SCALE_SD, random_);
+    firmware_.reset(native_stages_new(&stored, trial.estimates_load ? &profile : nullptr));
+    for (double t_s = 0.0; t_s < STARTS_s; t_s += period_s_) {
+      frame(t_s, {});
+    }
   }
   double next_s() const { return next_s_; }
   void skip() { next_s_ += period_s_; }
   bool is_lost(double share) { return random_.uniform(0.0, 1.0) < share; }
   // From next_s on its way.
   double known_s(double jitter_s, double later_s) {
-    known_s_ = std::max(known_s_, next_s_ + 0.5 * std::min(CONVERSION_s, period_s_) + std::min(PROCESSING_s, period_s_) + pad_.delay_s +
+    known_s_ = std::max(known_s_, next_s_ + 0.5 * std::min(CONVERSION_s, period_s_) + std::min(PROCESSING_s, period_s_) + kind_.delay_s +
                                       later_s + jitter_s * std::abs(random_.normal()));
     return known_s_;
   }
 
-  GripTouch measure(double force_N, const Vector &load_N, const Vector &way_mm) {
-    GripTouch touch{};
-    touch.t_s = next_s_;
-    const double sensed_N =
-        pad_.gain * force_N * (1.0 + noise_ * FORCE_NOISE * random_.normal()) + noise_ * FORCE_NOISE_N * random_.normal();
-    contact_input input{};
-    input.t_us = in_us(next_s_);
-    input.contact = sensed_N > GATE_N;
-    fit_result fitted{};
-    fitted.used = 0x7fff;
-    input.fit = &fitted;
-    fit_tangential found{};
-    contact_result result{};
-    ::motion moved{};
-    const bool has_load = load_share_ > 0.0 && sigma_mm_ == POINT_mm;
-    if (input.contact) {
-      const double share = 1.0 / std::max(force_N, GATE_N);
-      const auto noise = [&](double sd) { return noise_ * sd * random_.normal(); };
-      found.valid = true;
-      found.force_N = static_cast<float>(sensed_N);
-      const double load_gain = load_share_ * pad_.gain;
-      found.qx_N = static_cast<float>(mirror_ * (load_gain * load_N.x + pad_.ratio.x * sensed_N) + noise(LOAD_NOISE_N));
-      found.qy_N = static_cast<float>(load_gain * load_N.y + pad_.ratio.y * sensed_N + noise(LOAD_NOISE_N));
-      const double moved_mm = share * (has_load ? pad_.crosstalk : std::min(PULLED * sigma_mm_, PULLED_mm));
-      found.x_mm = static_cast<float>(mirror_ * (way_mm.x + moved_mm * load_N.x) + noise(PLACE_NOISE_mm));
-      found.y_mm = static_cast<float>(way_mm.y + moved_mm * load_N.y + noise(PLACE_NOISE_mm));
-      found.location_noise_mm = static_cast<float>(PLACE_NOISE_mm);
-      found.location_sd_mm = 0.1F;
-      input.tangential = has_load ? &found : nullptr;
-      result.flags = CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TARED |
-                     CONTACT_FLAG_CALIBRATED | std::uint32_t{has_load ? CONTACT_FLAG_TANGENTIAL_VALID : CONTACT_FLAG_UNCERTAIN};
-      float slip_mm = 0.0F;
-      if (slip_update(&slips_, input.t_us, found.x_mm, found.y_mm, SLIP_WINDOW_us, &slip_mm) && slip_mm > SLIP_mm) {
-        result.flags |= CONTACT_FLAG_SLIP;
-      }
-    } else {
-      slip_reset(&slips_);
-    }
-    motion_update(&history_, &settings_, &input, &result, &moved);
-    touch.flags = result.flags;
-    if (input.contact) {
-      touch.force_N = sensed_N;
-      touch.force_sd_N = 0.05 * sensed_N;
-      touch.x_mm = static_cast<double>(found.x_mm);
-      touch.y_mm = static_cast<double>(found.y_mm);
-      touch.sigma_mm = sigma_mm_;
-      touch.qx_N = has_load ? static_cast<double>(found.qx_N) : 0.0;
-      touch.qy_N = has_load ? static_cast<double>(found.qy_N) : 0.0;
-      touch.q_sd_N = 0.05 * sensed_N;
-      touch.speed_x_mm_s = static_cast<double>(moved.vx_mm_s);
-      touch.speed_y_mm_s = static_cast<double>(moved.vy_mm_s);
-    }
-    return touch;
-  }
+  GripTouch measure(const Patch &patch) { return touch_from_packet(frame(STARTS_s + next_s_, patch), 1e6 * next_s_); }
 
 private:
-  static double sigma_of(Shape shape) {
-    const bool area = shape == Shape::box || shape == Shape::plate;
-    return shape == Shape::ball || shape == Shape::egg ? POINT_mm : area ? AREA_mm : LINE_mm;
+  wire_packet frame(double t_s, const Patch &patch) {
+    const Pressures base_Pa = face_.base_Pa(patch);
+    std::copy(base_Pa.begin(), base_Pa.end(), base_Pa_.begin());
+    rubber_.report(t_s, base_Pa_, sensed_Pa_);
+    std::array<std::int32_t, SENSORS> q10{};
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      q10[k] = static_cast<std::int32_t>(std::lround(1024.0 * (AIR_Pa + sensed_Pa_[k] + NOISE_Pa * random_.normal())));
+    }
+    wire_packet packet{};
+    native_stages_frame(firmware_.get(), in_us(t_s), q10.data(), static_cast<std::int32_t>(1024.0 * NOISE_Pa), &packet);
+    return packet;
   }
 
-  KindOfPad pad_;
-  double mirror_, load_share_, sigma_mm_, noise_, period_s_;
+  const KindOfPad &kind_;
+  const Face &face_;
+  double period_s_;
   Random random_;
-  tangential_settings settings_{};
-  motion_history history_{};
-  slip_history slips_{};
+  twin::Pad rubber_;
+  std::unique_ptr<native_stages, void (*)(native_stages *)> firmware_;
+  std::vector<double> base_Pa_, sensed_Pa_;
   double next_s_, known_s_ = 0.0;
 };
 
@@ -170,12 +135,12 @@ private:
 
 class KindRun {
 public:
-  KindRun(const KindTrial &trial, Controller &controller, const KindTrace &trace)
+  KindRun(const KindTrial &trial, const Face &face, Controller &controller, const KindTrace &trace)
       : trial_(trial), grasp_(trial.grasp), controller_(controller), trace_(trace), cell_(grasp_),
         gripper_(slowed(trial), trial.activates ? trial.gripper.traits.stroke_mm : grasp_.width_mm + grasp_.opens_mm,
                  Random(trial.seed, LINE, 0)),
-        tips_{Tip(trial, 0), Tip(trial, 1)}, faults_(trial.fault.value_or(Fault()), Random(trial.seed, FAULT, 0)), set_point_(trial),
-        is_between_(!trial.activates) {
+        tips_{Tip(trial, face, 0), Tip(trial, face, 1)}, faults_(trial.fault.value_or(Fault()), Random(trial.seed, FAULT, 0)),
+        set_point_(trial), is_between_(!trial.activates) {
     if (trial.activates) {
       gripper_.motion().power_off();
     }
@@ -238,13 +203,11 @@ private:
       if (tip.next_s() > t_s_) {
         continue;
       }
-      const auto touch = faults_.frame(i, tip.measure(cell_.force_N(i), cell_.load_N(i), cell_.way_mm()));
+      const auto touch = faults_.frame(i, tip.measure(is_between_ ? cell_.patch(i) : Patch()));
       const bool gone = static_cast<int>(i) == grasp_.gone && lift_s_ < NEVER_s && since_lift_s() >= grasp_.gone_s;
       if (!tip.is_lost(grasp_.lost_share) && !gone && touch) {
-        arrivals_.push_back({tip.known_s(grasp_.jitter_s, trial_.later_s), [this, i, touch = *touch] {
-                               controller_.take_touch(i, touch);
-                               sensed_N_[i] = touch.force_N;
-                             }});
+        arrivals_.push_back(
+            {tip.known_s(grasp_.jitter_s, trial_.later_s), [this, i, touch = *touch] { controller_.take_touch(i, touch); }});
       }
       tip.skip();
     }
@@ -366,7 +329,7 @@ private:
     }
     const double sent_mm = gripper_.sent().width_mm;
     if (trial_.still_s > 0.0 && touched_s_ < NEVER_s) {
-      const auto [low_N, high_N] = std::minmax(sensed_N_[0], sensed_N_[1]);
+      const auto [low_N, high_N] = std::minmax(report_.finger_N[0], report_.finger_N[1]);
       set_point_.sample(t_s_, trial_.set_of_smaller ? low_N : 0.5 * (low_N + high_N), sent_mm, touched_s_);
     }
     if (since_s < grasp_.steady_s) {
@@ -431,7 +394,6 @@ private:
   KindOutcome outcome_;
   Slips slips_;
   std::vector<double> margins_;
-  std::array<double, 2> sensed_N_{};
   bool over_ = false, is_between_, is_taken_ = false, has_asked_ = false;
   double t_s_ = 0.0, stepped_s_ = 0.0, sample_s_ = 0.0, answered_s_ = 0.0, touched_s_ = NEVER_s;
   double held_s_ = NEVER_s, lift_s_ = NEVER_s, slick_s_ = NEVER_s, slick_share_ = 1.0;
@@ -442,8 +404,8 @@ private:
 
 } // namespace
 
-KindOutcome run_kind(const KindTrial &trial, Controller &controller, const KindTrace &trace) {
-  return KindRun(trial, controller, trace).go();
+KindOutcome run_kind(const KindTrial &trial, const Face &face, Controller &controller, const KindTrace &trace) {
+  return KindRun(trial, face, controller, trace).go();
 }
 
 } // namespace fingertip::cell

@@ -1,14 +1,15 @@
 // One grasp (kinds.hpp), closed loop, in simulated time: the cell (cell.hpp), what two fingertips
 // report of it, a controller, and a gripper's mechanics.
 //
-// A simplified fingertip reports the truth with the kind's errors and noise. The firmware's own
-// motion.c decides from that whether it slides.
+// A fingertip is the firmware's own code (native_stages.h) on the pressures of what touches the pad (face.hpp), with the errors of real
+// pads: gains, memory, after-effects and noise.
 //
 // The controller steps after every frame and every status of the gripper (gripper_line.hpp), and
 // every 10 ms. Deterministic but for step_us: the same grasp, seed and controller give the same bits.
 #pragma once
 
 #include "grasp/control/grip.hpp"
+#include "simulation/cell/face.hpp"
 #include "simulation/cell/faults.hpp"
 #include "simulation/cell/gripper_motion.hpp"
 #include "simulation/cell/kinds.hpp"
@@ -48,10 +49,9 @@ struct KindTrial {
   KindOfGrasp grasp;
   GripperMechanics gripper;
   std::uint64_t seed = 0;
-  double later_s = 0.0;    // additional delay of all frames
-  double rate_Hz = 410.0;  // of frames
-  double load_share = 1.0; // share of the load that frames report; 0: they report none
-  double noise = 1.0;      // of frames; the sensors alone make a twentieth of it
+  double later_s = 0.0;       // additional delay of all frames
+  double rate_Hz = 410.0;     // of frames
+  bool estimates_load = true; // the fingertips know their pads
 
   // Instead of a lift: the object stays on the table for still_s, and the grip's force should be set_N,
   // by the mean of both reports or by the smaller one.
@@ -101,6 +101,6 @@ struct KindOutcome {
 using KindTrace = std::function<void(const std::vector<std::pair<const char *, double>> &moment)>;
 
 // trace: called every 2 ms.
-KindOutcome run_kind(const KindTrial &trial, Controller &controller, const KindTrace &trace = {});
+KindOutcome run_kind(const KindTrial &trial, const Face &face, Controller &controller, const KindTrace &trace = {});
 
 } // namespace fingertip::cell

@@ -118,16 +118,12 @@ KindOfGrasp draw_once(Random &random, Kind kind) {
   const double at_1_mm_N = random.log_uniform(2.0, 5.0), apart = random.uniform(-0.1, 0.1);
   const double friction = draw(random, ALL.friction[of]);
   const double side = (random.next() % 2 ? 0.5 : -0.5) * draw(random, ALL.side[of]);
-  const double gain_sd = random.uniform(0.01, 0.05), ratio = random.uniform(0.02, 0.05);
+  const double gain_sd = random.uniform(0.01, 0.05);
   const double delay_s = draw(random, ALL.delay_s[of]);
   for (int i = 0; i < 2; i++) {
-    const double sign = i == 0 ? 1.0 : -1.0, angle_rad = random.uniform(-M_PI, M_PI);
-    grasp.pads[static_cast<std::size_t>(i)] = {at_1_mm_N * (1.0 + sign * apart),
-                                               random.uniform(0.06, 0.3),
-                                               friction * (1.0 + sign * side),
+    const double sign = i == 0 ? 1.0 : -1.0;
+    grasp.pads[static_cast<std::size_t>(i)] = {at_1_mm_N * (1.0 + sign * apart), random.uniform(0.06, 0.3), friction * (1.0 + sign * side),
                                                1.0 + gain_sd * std::clamp(random.normal(), -2.5, 2.5),
-                                               {ratio * std::cos(angle_rad), ratio * std::sin(angle_rad)},
-                                               random.uniform(-0.3, 0.3),
                                                delay_s + random.uniform(0.0, 0.002)};
   }
   grasp.exponent = random.uniform(1.3, 1.9);

@@ -64,8 +64,6 @@ struct KindOfPad {
   double relaxation = 0.175; // share of the force lost in 8 s; real pads: 0.04 to 0.14
   double friction = 0.5;     // static
   double gain = 1.0;         // of the force that it reports, over the true one
-  Vector ratio;              // error of tangential over normal force
-  double crosstalk = 0.0;    // mm that a load as large as the force moves the reported location
   double delay_s = 0.0;      // of its frames, beyond the conversion, the processing and the line
 };
 

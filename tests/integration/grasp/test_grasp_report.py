@@ -108,7 +108,7 @@ class Grasp(unittest.TestCase):
     def test_what_is_written_to_read(self):
         self.run_tool("--grasps", "5")
         text = (self.out / "grasp.md").read_text()
-        words = "Simulated rubber/Nothing was checked on hardware/no load reported/Lines and areas report none/## By kind/## Set forces/## Wrong readings/## Faults/both frozen | holding | True"
+        words = "Simulated rubber/Nothing was checked on hardware/no load estimated/## By kind/## Set forces/## Wrong readings/## Faults/both frozen | holding | True"
         for each in words.split("/"):
             self.assertIn(each, text)
 

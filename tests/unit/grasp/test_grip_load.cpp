@@ -197,84 +197,91 @@ TEST(Grip, NothingIsMissingWhereNoLoadIsTold) {
   }
 }
 
-// Without a tangential force the place shows the load: no less than it needs, no more than where it shows nothing.
+// No fingertip has a tangential force; its place moves by what it would be.
+static GripWorld blind_world(double sigma_mm) {
+  GripWorld world;
+  world.sigma_mm = sigma_mm;
+  world.pulled_mm = 4.2;
+  world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
+  world.add_flags = {CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_UNCERTAIN};
+  return world;
+}
+
+// Without a tangential force the place shows the load; one frame shows nothing.
 TEST(Grip, IsAsFirmAsThePlaceShows) {
-  for (const auto &[load_N, sigma_mm] : {std::pair(0.5, 6.0), {2.0, 6.0}, {6.0, 6.0}, {2.0, 14.0}}) {
-    GripWorld world;
-    world.sigma_mm = sigma_mm;
-    world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
-    world.add_flags = {CONTACT_FLAG_UNCERTAIN, CONTACT_FLAG_UNCERTAIN};
-    world.pulled_mm = std::min(0.55 * sigma_mm, 3.9);
+  for (const auto &[load_N, sigma_mm] : {std::pair(0.3, 6.0), {0.8, 6.0}, {1.5, 6.0}, {0.8, 9.0}}) {
+    GripWorld world = blind_world(sigma_mm);
     world.load_share[1] = 0.6;
     world.grasp();
     EXPECT_LT(world.peak_N, 1.2 * world.settings.start_N);
     world.pull(load_N, 0.3);
     world.run(1.0);
-    const double least_N = std::min(world.settings.margin * load_N / world.settings.friction, world.settings.blind_N);
-    EXPECT_GT(world.force_N, 0.97 * least_N) << load_N;
-    EXPECT_LT(world.peak_N, 1.05 * world.settings.blind_N) << load_N;
-    EXPECT_NE(world.report.trouble & GRIP_NO_LOAD, 0u);
+    const double wanted_N = world.settings.margin * 0.8 * load_N / PLACE_FRICTION; // the mean of both
+    EXPECT_GT(world.force_N, 0.97 * wanted_N) << load_N;
+    EXPECT_LT(world.force_N, 1.4 * std::max(wanted_N, world.settings.floor_N)) << load_N;
+    EXPECT_EQ(world.report.trouble & GRIP_NO_LOAD, 0u);
     const double before_N = world.peak_N;
     world.moved_mm[0] = 8.0; // one frame
     world.run(world.frame_s);
     world.moved_mm[0] = 0.0;
     world.run(0.5);
     EXPECT_LT(world.peak_N, 1.2 * before_N) << load_N;
-    world.add_flags = {CONTACT_FLAG_FLAT, CONTACT_FLAG_FLAT};
-    world.run(1.0);
-    EXPECT_GT(world.force_N, 0.97 * world.settings.blind_N);
+    world.pull(0.0, 0.3);
+    world.run(1.5);
+    EXPECT_LT(world.force_N, std::max(0.6 * wanted_N, 1.4 * world.settings.floor_N)) << load_N;
   }
 }
 
-// What friction cannot hold is a slide, if eq. (7) reports one.
+// Places that move apart show an object that tilts. Fingertips may be mounted another way: a third of it may be a load.
+TEST(Grip, ATiltIsNoLoad) {
+  GripWorld world = blind_world(8.0);
+  world.grasp();
+  world.pull(0.5, 0.3);
+  world.run(1.0);
+  const double before_N = world.force_N;
+  for (int i = 0; i < 100; i++) {
+    world.moved_mm = {0.005 * i, -0.005 * i};
+    world.run(2e-3);
+  }
+  world.run(1.0);
+  EXPECT_NEAR(world.force_N, before_N, 0.1 * before_N);
+  EXPECT_EQ(world.report.slides, 0u);
+}
+
+// What moves further than friction holds slides: the grip grows, and what has slid is no load afterwards.
 TEST(Grip, APlaceBeyondFrictionSlides) {
-  for (const double ratio : {0.4, 0.7}) {
-    GripWorld world;
-    world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
-    world.grasp();
-    world.run(0.5);
-    world.add_flags = {CONTACT_FLAG_SLIP, CONTACT_FLAG_SLIP};
-    world.moved_mm = {0.5 * world.sigma_mm * ratio, 0.5 * world.sigma_mm * ratio};
-    double rise = 0.0; // friction may have fallen to 1 / 1.4 as the slide began
-    for (int i = 0; i < 300; i++) {
-      world.run(1e-3);
-      rise = world.report.wanted_N < world.settings.cap_N ? std::max(rise, world.report.wanted_N / world.force_N) : rise;
-    }
-    EXPECT_EQ(world.report.state, ratio > world.settings.friction ? GRIP_SLIPPING : GRIP_HOLDING) << ratio;
-    EXPECT_TRUE(ratio < world.settings.friction || std::abs(rise / world.settings.margin - 1.4) < 0.1) << rise / world.settings.margin;
+  GripWorld world = blind_world(6.0);
+  world.grasp();
+  world.pull(0.5, 0.3);
+  world.run(1.0);
+  const double before_N = world.force_N;
+  for (int i = 1; i <= 50; i++) {
+    world.moved_mm = {0.1 * i, 0.1 * i};
+    world.load_N = 0.22 * world.force_N;
+    world.run(2e-3);
+    EXPECT_TRUE(i < 36 || world.report.state == GRIP_SLIPPING) << i;
   }
+  EXPECT_GT(world.force_N, 1.2 * before_N);
+  EXPECT_EQ(world.report.slides, 1u);
+  world.run(0.1);
+  world.load_N = 0.22 * before_N;
+  world.run(3.0);
+  EXPECT_EQ(world.report.state, GRIP_HOLDING);
+  EXPECT_LT(world.force_N, 0.8 * world.settings.cap_N);
 }
 
-// Nothing but a load opens the gripper: neither noise nor the end of a slide.
+// Where there is no place either, noise does not open the gripper.
 TEST(Grip, WithoutALoadItOnlyCloses) {
-  for (const bool has_place : {true, false}) {
-    GripWorld world;
-    world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
-    world.add_flags = {has_place ? 0u : std::uint32_t{CONTACT_FLAG_FLAT}, has_place ? 0u : std::uint32_t{CONTACT_FLAG_FLAT}};
-    world.grasp();
-    const double before_N = world.force_N;
-    for (int i = 0; i < 2000; i++) {
-      world.gain = {1.0 + 0.05 * std::sin(0.7 * i), 1.0 + 0.05 * std::sin(0.4 * i)};
-      world.run(1e-3);
-      ASSERT_GT(world.force_N, 0.97 * before_N) << i;
-    }
-    EXPECT_LT(world.force_N, 1.3 * before_N);
-    world.moved_mm = {4.0, 4.0};
-    world.add_flags[0] = world.add_flags[1] |= CONTACT_FLAG_SLIP;
-    for (int i = 0; i < 30; i++) {
-      const double wanted_N = std::min(world.report.wanted_N, 0.9 * world.settings.cap_N);
-      world.gain = {1.0 + 0.05 * std::sin(0.7 * i), 1.0 + 0.05 * std::sin(0.7 * i)};
-      world.run(1e-3);
-      EXPECT_GE(world.report.wanted_N, wanted_N - 1e-9); // nor does it give up what a slide that goes on needs
-    }
-    world.add_flags[0] = world.add_flags[1] &= ~std::uint32_t{CONTACT_FLAG_SLIP};
-    const double caught_N = world.force_N;
-    EXPECT_GT(caught_N, 1.1 * before_N);
-    world.moved_mm = {0.0, 0.0};
-    world.run(2.0);
-    EXPECT_GT(world.force_N, 0.98 * std::min(caught_N, 0.9 * world.settings.cap_N));
-    EXPECT_TRUE(!has_place || world.report.wanted_N < before_N); // nor does it go on closing for a load that has gone
+  GripWorld world = blind_world(6.0);
+  world.add_flags = {CONTACT_FLAG_FLAT, CONTACT_FLAG_FLAT};
+  world.grasp();
+  const double before_N = world.force_N;
+  for (int i = 0; i < 2000; i++) {
+    world.gain = {1.0 + 0.05 * std::sin(0.7 * i), 1.0 + 0.05 * std::sin(0.4 * i)};
+    world.run(1e-3);
+    ASSERT_GT(world.force_N, 0.97 * before_N) << i;
   }
+  EXPECT_LT(world.force_N, 1.3 * before_N);
 }
 
 // A place that was not there while the zero was taken shows no load.

@@ -156,8 +156,8 @@ TEST(Grip, NoMoveExceedsALowCapWhereverTheFirstTouchIs) {
   }
 }
 
-// A gripper of which the least move is two steps goes round to a step alone.
-TEST(Grip, ASetForceIsHeldAsNearAsAStep) {
+// A gripper whose least move is two steps holds a set force within one of them.
+TEST(Grip, ASetForceIsHeldAsNearAsItsLeastMove) {
   const double set_N = 8.0;
   for (double stiffness = 2.0; stiffness < 6.0; stiffness += 0.1) {
     GripWorld world({{"start", set_N}, {"floor", set_N}, {"blind", set_N}}, gripper_traits("2f85"));
@@ -167,62 +167,6 @@ TEST(Grip, ASetForceIsHeldAsNearAsAStep) {
     world.run(2.0);
     const double deep_mm = 0.5 * (world.object_mm - world.width_mm);
     const double step_N = world.power * world.force_N / deep_mm * 0.5 * world.traits.step_mm;
-    EXPECT_LT(std::abs(world.force_N - set_N), 0.75 * step_N) << stiffness;
-  }
-}
-
-// The same where the rubber relaxes; only there does the gripper open on the way.
-TEST(Grip, ASetForceIsFollowedRoundOnlyWhereALoadWouldBeFelt) {
-  for (const bool tells : {true, false}) {
-    GripWorld world({{"start", 8.0}, {"floor", 8.0}, {"blind", 8.0}}, gripper_traits("2f85"));
-    world.keeps_limit = true;
-    world.stiffness = 4.0;
-    if (!tells) {
-      world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
-    }
-    world.grasp();
-    double before_mm = world.width_mm, opened_mm = 0.0;
-    for (int i = 0; i < 6000; i++) {
-      world.stiffness -= 0.8 / 6000;
-      world.run(1e-3);
-      opened_mm = std::max(opened_mm, world.width_mm - before_mm);
-      before_mm = world.width_mm;
-    }
-    EXPECT_EQ(opened_mm > 0.0, tells);
-    EXPECT_EQ(world.report.state, GRIP_HOLDING);
-    EXPECT_GT(world.force_N, tells ? 7.0 : 6.0);
-  }
-}
-
-// What pulls on the way round ends it: the gripper closes at once.
-TEST(Grip, ALoadEndsGoingRound) {
-  GripWorld world({{"start", 8.0}, {"floor", 8.0}, {"blind", 8.0}}, gripper_traits("2f85"));
-  world.keeps_limit = true;
-  world.stiffness = 4.0;
-  world.grasp();
-  const double held_mm = world.width_mm + 0.5 * world.traits.step_mm;
-  for (int i = 0; i < 8000 && world.command.width_mm < held_mm; i++) {
-    world.stiffness -= 1e-4;
-    world.run(1e-3);
-  }
-  ASSERT_GT(world.command.width_mm, held_mm);
-  world.pull(1.0, 0.005);
-  world.run(0.03);
-  EXPECT_LT(world.command.width_mm, held_mm);
-}
-
-// A set force that going round would take away for a moment is not gone round to.
-TEST(Grip, GoingRoundNeverLosesTheObject) {
-  for (double stiffness = 4.0; stiffness < 12.0; stiffness += 0.25) {
-    GripWorld world({{"start", 2.0}, {"floor", 2.0}, {"blind", 2.0}}, gripper_traits("2f85"));
-    world.keeps_limit = true;
-    world.stiffness = stiffness;
-    world.grasp();
-    for (int i = 0; i < 4000; i++) {
-      world.stiffness *= 1.0 - 0.3 / 4000;
-      world.run(1e-3);
-      ASSERT_GT(world.force_N, 0.2) << stiffness;
-    }
-    EXPECT_EQ(world.report.state, GRIP_HOLDING) << stiffness;
+    EXPECT_LT(std::abs(world.force_N - set_N), 1.6 * step_N) << stiffness;
   }
 }
