@@ -56,8 +56,8 @@ class EmulatedFingertip {
 public:
   // random: of its sensors' gains and its calibration.
   EmulatedFingertip(const pad_profile &profile, Random random) {
-    for (double &gain : gain_) {
-      gain = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
+    for (std::size_t k = 0; k < SENSORS; k++) {
+      gain_[k] = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
     }
     const calibration stored = calibrated(gain_, CALIBRATION_SD, 1.0 / static_cast<double>(profile.force_ratio), FORCE_SCALE_SD, random);
     commands_ = {command_pad(profile), command_calibrate(stored, geometry.sensor_count)};

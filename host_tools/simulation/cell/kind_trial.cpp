@@ -74,9 +74,9 @@ public:
 private:
   wire_packet frame(double t_s, const Patch &patch) {
     const Pressures base_Pa = face_.base_Pa(patch);
-    std::copy(base_Pa.begin(), base_Pa.end(), base_Pa_.begin());
+    std::copy_n(base_Pa.begin(), SENSORS, base_Pa_.begin());
     rubber_.report(t_s, base_Pa_, sensed_Pa_);
-    std::array<std::int32_t, SENSORS> q10{};
+    std::array<std::int32_t, FT_MAX_SENSORS> q10{};
     for (std::size_t k = 0; k < SENSORS; k++) {
       q10[k] = static_cast<std::int32_t>(std::lround(1024.0 * (AIR_Pa + sensed_Pa_[k] + NOISE_Pa * random_.normal())));
     }
