@@ -40,8 +40,8 @@ struct GripReading {
   double t_s = 0.0;         // time of the measured force
   double load_x_N = 0.0, load_y_N = 0.0;
   double force_N = 0.0, sd_N = 0.0, load_N = 0.0, load_sd_N = 0.0, speed_mm_s = 0.0;
-  double pulled_x = 0.0, pulled_y = 0.0; // by_place: tangential over normal force, were it this fingertip's alone
-  bool by_place = false;                 // the load, by how far the contact has moved since end_zero; 0 before
+  bool by_place = false; // has_load is by how far the contact has moved since end_zero; pulled: tangential over normal force, of it alone
+  double pulled_x = 0.0, pulled_y = 0.0;
 };
 
 class GripReach;

@@ -134,12 +134,6 @@ void Grip::ramp(double to_mm, double speed_mm_s) {
 }
 
 void Grip::approach() {
-  if (reach_.is_in_detour()) {
-    if (readings_.fingers > 0 && reach_.continue_detour(now_s_, readings_.t_s)) {
-      enter(GRIP_SQUEEZE);
-    }
-    return;
-  }
   const bool blind = readings_.fingers == 0 && readings_.touches == 0;
   if (blind || now_s_ > status_.t_s() + WIDTH_STALE_s) {
     ramped_s_ = now_s_;
@@ -193,12 +187,6 @@ std::uint32_t Grip::squeeze() {
   const bool nearest = !fixed && readings_.fingers > 0 && reach_.has_come(now_s_, readings_.t_s);
   const bool there = (readings_.low_N >= SQUEEZED * aimed_N || nearest) && risen_N >= aimed_N;
   const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, readings_.t_s);
-  // A detour brings a grip that is far too weak one step nearer.
-  if (nearest && (capped || there) && !settings_.sets_force() && readings_.low_N < SQUEEZED * aimed_N &&
-      reach_.start_detour(readings_, settings_, now_s_)) {
-    enter(GRIP_APPROACH);
-    return trouble;
-  }
   const bool over = now_s_ - since_s_ > SQUEEZE_s;
   const double least_N = fixed ? settings_.touch_N : HALF * aimed_N;
   if (over && (alone || readings_.fingers == 0 || (readings_.low_N < least_N && !capped))) {

@@ -175,31 +175,6 @@ double GripReach::travel_below_cap_mm(const GripReadings &readings, const GripSe
   return coming_mm - bound_.width_below(settings.cap_N, most_N(readings), width_at(readings.t_s));
 }
 
-bool GripReach::start_detour(const GripReadings &readings, const GripSettings &settings, double now_s) {
-  const double coming = coming_mm(now_s);
-  const bool can = least_mm() > traits_.step_mm && !readings.is_alone() && !readings.over && !limits_itself(settings);
-  if (!can || travel_below_cap_mm(readings, settings, coming) <= traits_.step_mm) {
-    return false;
-  }
-  in_detour_ = true;
-  detour_end_mm_ = coming - traits_.step_mm;
-  target_mm_ = coming + least_mm();
-  aimed_s_ = now_s;
-  return true;
-}
-
-bool GripReach::continue_detour(double now_s, double frame_s) {
-  if (!rests(now_s, frame_s)) {
-    return false;
-  }
-  in_detour_ = target_mm_ != detour_end_mm_;
-  if (in_detour_) {
-    target_mm_ = detour_end_mm_;
-    aimed_s_ = now_s;
-  }
-  return !in_detour_;
-}
-
 // Whole steps to the position whose force is nearest. The least move is made when it reduces the error.
 double GripReach::nearest_steps(double off, double least_mm) const {
   const double least = std::round(least_mm / traits_.step_mm);

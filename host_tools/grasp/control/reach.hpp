@@ -95,10 +95,7 @@ public:
   // The width that was last sent.
   double target_mm() const { return target_mm_; }
   void send(double width_mm) { target_mm_ = width_mm; }
-  void stop() {
-    target_mm_ = status_.width_mm;
-    in_detour_ = false;
-  }
+  void stop() { target_mm_ = status_.width_mm; }
   // The last move is complete, and this frame was measured after it.
   bool has_come(double now_s, double frame_s) const;
   // In addition, the gripper's own answers state that it was not moving when the frame was measured.
@@ -135,13 +132,6 @@ public:
 
   // Sends the gripper to the width of the wanted force. Returns the caps that prevent it.
   std::uint32_t aim(const GripAim &aim, const GripReadings &readings, const GripSettings &settings, double now_s);
-
-  // Detour: a gripper whose least move is several steps comes one step closer by two moves, back and on again. Only before anything is
-  // lifted. True: it begins, as only the fingertips keep the cap and one step stays below it.
-  bool start_detour(const GripReadings &readings, const GripSettings &settings, double now_s);
-  bool is_in_detour() const { return in_detour_; }
-  // Continues the detour; true once the gripper is at its end.
-  bool continue_detour(double now_s, double frame_s);
 
 private:
   // The width at which the gripper will stop. At rest it makes no move shorter than its deadband.
@@ -189,8 +179,6 @@ private:
   double aimed_s_ = 0.0; // last change of target_mm_ for a force
   double poll_s_ = 0.0;
   double stopped_s_ = 0.0; // time of the first answer without motion since the last move
-  bool in_detour_ = false;
-  double detour_end_mm_ = 0.0;
   struct Width {
     double t_s, width_mm;
   };

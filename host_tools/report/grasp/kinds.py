@@ -87,7 +87,6 @@ def summary(each):
         "first_grip_below_wanted_half_percent": percent(sum(one["first_N"] < 0.5 * one["start_N"] for one in each), len(each)),
         "turned_unreported_percent": percent(sum(one["turned_deg"] > TURNED_deg and one["slides"] == 0 for one in held), len(held)),
         "friction_below_0.6_of_true_percent": percent(sum(one["learnt"] < LEARNT for one in slid), len(slid)),
-        "step_us": quantile([one["step_us"] for one in each], 0.5),
     }
 
 
@@ -163,7 +162,6 @@ JUDGED = {
     "late_40ms_drops_percent": (3, worst("drops_percent", "usual and rough, 40 ms later")),
     "turned_unreported_percent": (None, worst("turned_unreported_percent", "usual and rough")),
     "friction_below_0.6_of_true_percent": (5, worst("friction_below_0.6_of_true_percent", "usual and rough")),
-    "step_us": (20, worst("step_us")),
     "limit_cycles": (0, lambda ours, sets, wrong: sum(row["limit_cycles"] for row in sets if row["row"] != "12 s")),
     "one_bad_frame_squeezed": (0, lambda ours, sets, wrong: sum(row["squeezed"] for row in wrong if row["wrong"] in WRONG_SHORT)),
     "lasting_bad_squeezed_percent": (

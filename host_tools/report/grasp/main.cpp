@@ -142,7 +142,6 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
                     {"peak_N", o.peak_N},
                     {"start_N", one.settings.start_N},
                     {"cap_N", one.settings.cap_N},
-                    {"step_us", o.step_us},
                     {"events", ordered_json::array()},
                     {"catches", ordered_json::array()}};
   for (const Event &event : grasp.events) {

@@ -244,15 +244,14 @@ private:
   }
 
   void advance(double to_s) {
-    const double seconds = to_s - t_s_;
-    if (seconds <= 0.0) {
+    if (to_s <= t_s_) {
       return;
     }
     if (t_s_ >= holds_s_ + grasp_.waits_s && world_.lift()) {
       lift_s_ = t_s_;
     }
     const double width_mm = gripper_.motion().width_mm();
-    world_.advance(seconds);
+    world_.advance(to_s - t_s_);
     t_s_ = to_s;
     if (gripper_.motion().width_mm() != width_mm) {
       moved_.push_back({t_s_, gripper_.motion().width_mm()});

@@ -1,7 +1,6 @@
 #include "simulation/cell/kind_trial.hpp"
 
 #include "grasp/fingertip.hpp"
-#include "libfingertip/clock.hpp"
 #include "libfingertip/random.hpp"
 #include "library/pad/profile.hpp"
 #include "simulation/cell/calibrated.hpp"
@@ -242,10 +241,7 @@ private:
   }
 
   void step_controller() {
-    const std::int64_t began_us = steady_now_us();
     report_ = controller_.step(t_s_, command_);
-    stepping_us_ += static_cast<double>(steady_now_us() - began_us);
-    steps_++;
     stepped_s_ = t_s_;
     faults_.watch(t_s_, report_.state);
     if (faults_.has_begun(t_s_)) {
@@ -357,7 +353,6 @@ private:
   }
 
   KindOutcome outcome() {
-    outcome_.step_us = stepping_us_ / std::max(steps_, 1.0);
     outcome_.slides = report_.slides;
     outcome_.friction = 2.0 * report_.friction / (cell_.friction(0) + cell_.friction(1));
     outcome_.slid_mm = cell_.slid_mm();
@@ -398,7 +393,6 @@ private:
   double t_s_ = 0.0, stepped_s_ = 0.0, sample_s_ = 0.0, answered_s_ = 0.0, touched_s_ = NEVER_s;
   double held_s_ = NEVER_s, lift_s_ = NEVER_s, slick_s_ = NEVER_s, slick_share_ = 1.0;
   double least_N_ = 0.0, turned_mm_ = 0.0, began_mm_ = 0.0;
-  double stepping_us_ = 0.0, steps_ = 0.0;
   int reversals_ = 0, direction_ = 0;
 };
 

@@ -5,7 +5,7 @@
 // pads: gains, memory, after-effects and noise.
 //
 // The controller steps after every frame and every status of the gripper (gripper_line.hpp), and
-// every 10 ms. Deterministic but for step_us: the same grasp, seed and controller give the same bits.
+// every 10 ms. Deterministic: the same grasp, seed and controller give the same bits.
 #pragma once
 
 #include "grasp/control/grip.hpp"
@@ -94,7 +94,6 @@ struct KindOutcome {
   double rms = 0.0;               // of the error from there on, share of the set force
   int reversals = 0;              // of the commanded width over the last half of the time
   Failed failed;
-  double step_us = 0.0; // real time of a step of the controller, the mean
 };
 
 // What is true at a time, by name; lift_s: since the lift began, -1 before it.

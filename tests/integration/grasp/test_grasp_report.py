@@ -15,7 +15,7 @@ import json, sys
 options = dict(zip(sys.argv[1::2], sys.argv[2::2]))
 slide = {"begin_s": 1.0, "way_mm": 2.0, "peak_N": 3.8, "least_N": 2.0, "reaction_ms": 30.0}
 grasp = {"n": 7, "mass_kg": 0.3, "friction": 0.5, "lift_s": 0.2, "dropped": False, "never_held": False, "crushed": False, "hunts": False, "margin": 2.1, "slid_mm": 2.0, "turned_deg": 0.0, "shape": "ball", "slides": 1, "learnt": 0.9,
-         "first_N": 4.0, "peak_N": 15.0, "start_N": 4.0, "cap_N": 20.0, "step_us": 1.0, "events": ["knock"], "catches": [slide]}
+         "first_N": 4.0, "peak_N": 15.0, "start_N": 4.0, "cap_N": 20.0, "events": ["knock"], "catches": [slide]}
 fault = {"fault": "one fingertip gone", "state": "holding", "gripper": "2f85", "object": "paper cup", "begun": True, "untold": False, "reported": "finger_0_stale",
          "ends": "holding", "opened_mm": 0.3, "peak_N": 3.0, "cap_N": 4.0, "crushed": True, "opened": False, "beyond_cap": False, "unsaid": False}
 if "--faults" in sys.argv:

@@ -13,9 +13,13 @@ static void fit(void *context) {
   job.crc = fit_bits_of((enum fit_bits_kernel)job.kernel, job.press);
 }
 
-static bool serve(void *context) { return worker_serve(context); }
+static bool serve(void *context) {
+  (void)context;
+  return worker_serve(&worker);
+}
 
 int main(void) {
+  extern uint32_t __bss_start[]; /* the second processor writes to what lies behind */
   bool is_started = false;
   fit_bits_init();
   worker_init(&worker, fit, &job);
@@ -27,7 +31,7 @@ int main(void) {
       port_panic();
     }
     if (job.second && !is_started) {
-      is_started = port_worker_start(serve, &worker);
+      is_started = port_worker_start(serve, __bss_start);
     }
     worker_ask(&worker);
     if (is_started) {
