@@ -134,7 +134,7 @@ TEST(Grip, NoMoveExceedsALowCapWhereverTheFirstTouchIs) {
           EXPECT_LE(world.peak_N, 2.4) << about;
           if (off_mm == 0.0) { // one that does not give may leave no room for the other pad
             EXPECT_EQ(world.report.state, GRIP_HOLDING) << about;
-            EXPECT_GE(world.force_N, 0.45) << about;
+            EXPECT_GE(world.force_N, (world.report.trouble & GRIP_AT_CAP) != 0 ? 0.4 : 0.6) << about; // what is weaker says why
           }
         }
       }
