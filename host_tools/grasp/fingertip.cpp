@@ -47,9 +47,9 @@ void check_for_grasp(const std::string &name, const wire_info &info, const wire_
 std::vector<std::string> lacks_for_grasp(const wire_info &info, bool needs_load) {
   std::vector<std::string> lacks;
   if (needs_load && (info.capabilities & WIRE_CAPABILITY_TANGENTIAL) == 0) {
-    lacks.push_back("reports no load, --blind holds: flash scene grasp");
+    lacks.push_back("no load is estimated, only places show it: flash scene grasp");
   } else if (needs_load && (info.stored & WIRE_STORED_PAD) == 0) {
-    lacks.push_back("reports no load, --blind holds: fingertip pad");
+    lacks.push_back("no load is estimated, only places show it: fingertip pad");
   }
   if ((info.stored & WIRE_STORED_CALIBRATION) == 0) {
     lacks.push_back("forces may be off by some 10 %: fingertip calibrate");
