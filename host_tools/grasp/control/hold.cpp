@@ -144,7 +144,7 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
                          : was_loaded_                         ? settings.floor_N + late_N
                                                                : settings.first_N();
   double need = std::max(need_N(settings, readings.delay_s, dead_s), least_N);
-  need = std::min(need, settings.cap_N);
+  need = std::min({need, settings.cap_N, by_place_ && slides_ == 0 ? settings.unseen_N() : settings.cap_N}); // places may drift
   is_set_ = settings.sets_force() && need == least_N && !is_loaded() && slides_ == 0;
   // A force that was wanted and is not under way is given up: the load that it was for has not come.
   if (readings.has_load && !goes_on_) {
