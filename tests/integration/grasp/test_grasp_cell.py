@@ -204,7 +204,7 @@ class Course(CellTest):
 
     def test_a_grasp_of_a_kind(self):
         """What is drawn happens: the truth has it, and its need follows it."""
-        with self.cell("--kind", "slick", "--seed", "9"):
+        with self.cell("--kind", "slick", "--seed", "4"):
             process = self.start("-o", self.csv)
             self.wait_for_event("slick")
             self.pass_time(0.5)
@@ -213,7 +213,7 @@ class Course(CellTest):
         truth, events = self.truth()
         with open(self.truth_csv, encoding="utf-8") as file:
             head = dict(line[2:].strip().split(": ", 1) for line in file if line.startswith("# ") and ": " in line)
-        self.assertEqual((head["kind"], head["seed"]), ("slick", "9"))
+        self.assertEqual((head["kind"], head["seed"]), ("slick", "4"))
         self.assertNotEqual(head["mass_kg"], "0.3")
         self.assertLess([text for _, text in events].index("lift"), [text for _, text in events].index("slick"))
         need_N = truth["least_N"][truth["least_N"] > 0]
