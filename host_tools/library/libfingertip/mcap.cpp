@@ -432,11 +432,11 @@ bool Reader::read_record() {
   }
   const auto end = record_ + static_cast<std::streamoff>(sizeof head + length);
   if (opcode == FOOTER && is_behind_) {
-    char behind[2 * sizeof MAGIC];
-    const bool is_whole = bytes_->read(static_cast<std::uint64_t>(end), behind, sizeof behind) == sizeof behind;
+    char behind[sizeof MAGIC];
+    const auto begin = static_cast<std::uint64_t>(end) + sizeof MAGIC;
+    const bool is_whole = size >= begin + sizeof behind && bytes_->read(begin, behind, sizeof behind) == sizeof behind;
     ended_ = true;
-    if (is_whole && std::equal(std::begin(MAGIC), std::end(MAGIC), behind + sizeof MAGIC)) {
-      const auto begin = static_cast<std::uint64_t>(end) + sizeof MAGIC;
+    if (is_whole && std::equal(std::begin(MAGIC), std::end(MAGIC), behind)) {
       throw Damage("byte " + std::to_string(begin) + ": another MCAP file begins; head -c " + std::to_string(begin) + " and tail -c +" +
                    std::to_string(begin + 1) + " take them apart");
     }
