@@ -189,12 +189,12 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
 
 using Readings = std::array<GripReading, GRIP_FINGERS>;
 
-// Where no fingertip has a load, and each contact a place. What both places have in common is the load: an object that tilts moves them
+// Where no fingertip has a load, and each has a place. What both places have in common is the load: an object that tilts moves them
 // apart.
 static void load_by_place(Readings &readings, const GripSettings &settings, GripPlaceLoad &place) {
   double t_s = 0.0, force_N = 0.0, x = 0.0, y = 0.0, most = 0.0;
   for (GripReading &reading : readings) {
-    if (reading.has_load || (reading.contact && !reading.by_place)) {
+    if (reading.has_load || (reading.counts && !reading.by_place)) {
       return;
     }
     reading.by_place = reading.by_place && reading.has_force;
