@@ -16,18 +16,16 @@ import pathlib
 import sys
 import tempfile
 
-import numpy as np
-
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 import grasp_rate  # noqa: E402
 import rate_report  # noqa: E402
 import scenes  # noqa: E402
-from boards import BOARDS, DESCRIPTORS, PARALLEL, short  # noqa: E402
+from boards import BOARDS, PARALLEL, short  # noqa: E402
 from emulated import CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, distribution, scenario  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
-from reporting import Steps, option_parser, output_folder, publish, run  # noqa: E402
+from reporting import Steps, option_parser, output_folder, publish  # noqa: E402
 
 # What the checks of the images allow each scene.
 LIMITS = json.loads((ROOT / "tests/checks/scene_limits.json").read_text(encoding="utf-8"))
@@ -92,30 +90,6 @@ def by_osr(runs):
     ]
 
 
-def by_sensors(tools, runs):
-    """Cycles counted on the chip for each number of sensors, and the rates and latencies at OSR 256 that follow from them."""
-    run("cmake", "--build", tools.boards / PARALLEL, "--target", "sensor_cycles")
-    rows = json.loads(run("node", ROOT / "host_tools/report/rate/sensors/sensor_cycles.mjs", tools.boards / PARALLEL))
-
-    def cycles(row):
-        return row["take"] + row["condition"] + row["fit"]
-
-    fifteen = cycles(next(row for row in rows if row["sensors"] == 15 and row["kernel"] == "fixed point"))
-    found = []
-    for row in sorted(rows, key=lambda row: (row["kernel"], row["sensors"])):
-        new = dict(row)
-        for board, measured in ((board, runs[board, 256]) for board in BOARDS):
-            extra = cycles(row) - fifteen
-            busy = (1 - measured.sleep_percent / 100) * CLOCK_Hz / measured.frames_per_s
-            # A line for each sensor costs no time; behind multiplexers each sensor is read in turn.
-            bus_us = (row["sensors"] - 15) * measured.stages_us["read_us"] / 15 if DESCRIPTORS[board]["bus"] == "multiplexed" else 0
-            name = short(board)
-            new[f"{name}_fps"] = min(1e6 / (1e6 / measured.frames_per_s + bus_us), CLOCK_Hz / (busy + extra))
-            new[f"{name}_latency_us"] = float(np.median(measured.offered_us)) + extra / CLOCK_Hz * 1e6 + bus_us
-        found.append(new)
-    return found
-
-
 def figures(runs, resting, rows):
     parallel = runs[PARALLEL, 256]
 
@@ -165,7 +139,7 @@ def main(argv):
         )
         of_grasp = grasp_rate.figures(grasp)
     found = judge(figures(runs, resting, rows) | of_grasp, GOALS)
-    found |= {"by_osr": by_osr(runs), "by_sensors": by_sensors(tools, runs), "scenes": rows}
+    found |= {"by_osr": by_osr(runs), "scenes": rows}
     pictures = {"rate.png": lambda path: rate_report.draw(path, found, runs[PARALLEL, 256])}
     return publish(found, options, "rate", pictures | {"scenes.png": lambda path: rate_report.draw_scenes(path, rows)})
 

@@ -4,23 +4,20 @@ import itertools
 import textwrap
 
 import matplotlib
-from boards import BOARDS, DESCRIPTORS, PARALLEL, short
+from boards import BOARDS, PARALLEL
 from presentation import BLUE, FAINT, GOAL, ORANGE, plt, save
 from emulated import CONVERSION_us
 from scenes import WORDS, capabilities
 
-# Twenty-six pins on a Pico's edge, one for SCL.
-DATA_PINS = 25
 COLOURS = dict(zip(BOARDS, itertools.cycle((BLUE, ORANGE, GOAL, FAINT))))
 
 
 def draw(path, found, parallel):
-    figure, ((rate, latency), (stages, sensors)) = plt.subplots(2, 2, figsize=(12, 8))
-    draw_rates(rate, found)
-    draw_latency(latency, found, parallel)
-    draw_stages(stages, found)
-    draw_sensors(sensors, found)
-    for axes in (rate, latency, stages, sensors):
+    figure, panels = plt.subplot_mosaic("RL;SS", figsize=(12, 8))
+    draw_rates(panels["R"], found)
+    draw_latency(panels["L"], found, parallel)
+    draw_stages(panels["S"], found)
+    for axes in panels.values():
         axes.grid()
         axes.legend(fontsize=8)
     figure.tight_layout()
@@ -92,23 +89,3 @@ def draw_stages(axes, found):
         left = [a + b for a, b in zip(left, width)]
     axes.set(xlabel="thousand cycles of a frame, OSR 256, in contact", title="Where the cycles go")
     axes.tick_params(axis="y", labelsize=7)
-
-
-def draw_sensors(axes, found):
-    for kernel, style in (("fixed point", "o-"), ("float", "s--")):
-        for board in BOARDS:
-            rows = [
-                row
-                for row in found["by_sensors"]
-                if row["kernel"] == kernel and (DESCRIPTORS[board]["bus"] != "parallel" or row["sensors"] <= DATA_PINS)
-            ]
-            axes.plot(
-                [row["sensors"] for row in rows],
-                [row[f"{short(board)}_fps"] for row in rows],
-                style,
-                color=COLOURS[board],
-                label=f"{board}, {kernel}",
-            )
-    axes.set(
-        xlabel="sensors", ylabel="frames a second, OSR 256", yscale="log", title="More or fewer sensors: cycles measured, rates computed"
-    )

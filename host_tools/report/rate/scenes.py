@@ -41,11 +41,11 @@ def capabilities():
     return found
 
 
-def build(scene, board, folder):
-    """Folder of the images of a scene on a board."""
+def build(scene, board, folder, root=ROOT):
+    """Folder of the images of a scene on a board of the tree `root`."""
     place = pathlib.Path(folder).absolute() / scene / board
-    chip = ["-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_TOOLCHAIN_FILE={ROOT}/cmake/toolchain-arm-none-eabi.cmake"]
-    run("cmake", "-G", "Ninja", "-S", ROOT, "-B", place, *chip, f"-DFINGERTIP_BOARD={board}", f"-DFINGERTIP_SCENE={scene}")
+    chip = ["-DCMAKE_BUILD_TYPE=Release", f"-DCMAKE_TOOLCHAIN_FILE={root}/cmake/toolchain-arm-none-eabi.cmake"]
+    run("cmake", "-G", "Ninja", "-S", root, "-B", place, *chip, f"-DFINGERTIP_BOARD={board}", f"-DFINGERTIP_SCENE={scene}")
     run("cmake", "--build", place, "--target", f"fingertip-{board}", "-j", "1")
     return place
 
@@ -92,8 +92,9 @@ def guard_sizes(place):
     return found
 
 
-def cycles(command_frame, place, scene, board, osrs, folder):
-    """Cycles of a frame by stage without and in contact, at the first OSR, and frames a second at each."""
+def cycles(command_frame, place, scene, board, osrs, folder, contact=None, root=ROOT):
+    """Cycles of a frame by stage without and in contact, at the first OSR, and frames a second at each. contact(seconds) writes the scenario, which
+    touches from CONTACT_FROM_s on, else "wander" is it; root: the tree that has the board."""
 
     def encoded(*command):
         return run(command_frame, *command).strip()
@@ -109,8 +110,8 @@ def cycles(command_frame, place, scene, board, osrs, folder):
     host_script.write_text("".join(f"{at_s:.3f} {what}\n" for at_s, what in sorted(script)))
     windows = [word for name, from_s, to_s in windows for word in ("--window", f"{name}:{from_s:.3f}:{to_s:.3f}")]
     image = ("--image", place / f"fingertip-{board}", "--board", board, "--host-script", host_script)
-    path = scenario(folder, "wander", t_s + 1, f"{scene}-{board}")
-    found = json.loads(run("node", ROOT / "host_tools/report/rate/stage_cycles.mjs", *image, "--scenario", path, *windows))
+    path = contact(t_s + 1) if contact else scenario(folder, "wander", t_s + 1, f"{scene}-{board}")
+    found = json.loads(run("node", root / "host_tools/report/rate/stage_cycles.mjs", *image, "--scenario", path, *windows))
     contact = found[str(osrs[0])]
     guards = sum(cycles for name, cycles in contact["functions"].items() if set(name.split("=")) & set(GUARD_FUNCTIONS))
     return {

@@ -49,7 +49,7 @@ class Tools:
 def pressed(path, name, times_s, sensors_Pa):
     """A scenario of pressures [time, sensor], whose truth is not judged."""
     columns = dict.fromkeys(TRUTH_COLUMNS, np.zeros(len(times_s))) | {"t_s": times_s, "sensors_Pa": sensors_Pa}
-    write_scenario(path, {"name": name}, columns)
+    write_scenario(path, {"name": name, "sensors": sensors_Pa.shape[1]}, columns)
     return path
 
 

@@ -73,8 +73,6 @@ class Rate(report_case.ReportCase):
         self.assertLess(abs(slip["frames_per_s"]["256"] - self.found["parallel_fps_osr256"]), 3)
         by_chip = (1 - self.found["contact_sleep_percent"] / 100) * emulated.CLOCK_Hz / self.found["parallel_fps_osr256"]
         self.assertLess(abs(by_chip / slip["cycles_of_frame"] - 1), 0.02)
-        fit = next(row["fit"] for row in self.found["by_sensors"] if row["sensors"] == 15 and row["kernel"] == "fixed point")
-        self.assertLess(abs(slip["cycles_by_stage"]["fit"] / fit - 1), 0.05)
 
     def test_guards_are_there_and_cheap(self):
         for row in self.found["scenes"]:
@@ -89,13 +87,6 @@ class Rate(report_case.ReportCase):
             self.assertLess(raw[name], slip[name], name)
         self.assertEqual(raw["cycles_by_stage"]["fit"], 0)
         self.assertGreater(slip["cycles_by_stage"]["fit"], 15000)
-        for kernel in ("fixed point", "float"):
-            rows = [row for row in self.found["by_sensors"] if row["kernel"] == kernel]
-            self.assertEqual(rows, sorted(rows, key=lambda row: row["sensors"]))
-            fits = [row["fit"] for row in rows]
-            self.assertEqual(fits, sorted(fits))
-            self.assertLess(max(row["error_um"] for row in rows), 1)
-        self.assertEqual({row["sensors"] for row in self.found["by_sensors"]} & {5, 15, 32}, {5, 15, 32})
 
     def test_text_and_picture(self):
         for name in ("rate.png", "scenes.png"):

@@ -1,6 +1,8 @@
 /** Runs fits on the emulated chip one at a time and counts their cycles: the other half of main.c. */
+import { Chip, Stopped } from '../../../simulation/emulator/chip/chip.mjs';
+import { SimulatedTime } from '../../../simulation/emulator/clock.mjs';
 import { Prng } from '../../../simulation/emulator/prng.mjs';
-import { JobBench } from '../../shared/jobs_on_chip.mjs';
+import { Report } from '../../../simulation/emulator/report.mjs';
 
 /** In the order of `kernels` in main.c. */
 export const KERNELS = (
@@ -10,10 +12,48 @@ export const KERNELS = (
 /** Words of `job` in main.c. */
 const FIELDS = { kernel: 0, iterations: 1, noise_Pa_q10: 2, usable: 3, own: 4, readings: 5, x_mm: 37, y_mm: 38 };
 const [PITCH_mm, SENSORS, SEED] = [9, 15, 20221015];
+const [NEXT_JOB, START, STOP] = [1, 2, 3];
+const RAM = 0x20000000;
 
 /** One chip that runs fit_cycles.bin. */
-export class Bench extends JobBench {
-  overhead = this.run({ kernel: 'nothing' }).cycles;
+export class Bench {
+  constructor(image) {
+    this.time = new SimulatedTime();
+    this.report = new Report(() => this.time.nanos);
+    this.chip = new Chip(this.time, this.report, { serial: new Uint8Array(8) });
+    this.chip.load(image);
+    this.chip.boot();
+    const { chip } = this;
+    const breakpoint = chip.onBreak;
+    let started;
+    chip.onBreak = (code) => {
+      if (code === START) started = chip.core.cycles;
+      else if (code === STOP) this.cycles = chip.core.cycles - started;
+      else if (code === NEXT_JOB) throw new Stopped('next job');
+      else breakpoint(code);
+    };
+    this.runJob();
+    this.overhead = 0;
+    this.overhead = this.run({ kernel: 'nothing' }).cycles;
+  }
+
+  /** `job` of the image. */
+  get job() {
+    const { sram, core } = this.chip;
+    return new DataView(sram.buffer, sram.byteOffset + core.registers[0] - RAM);
+  }
+
+  /** @returns the cycles that the job counts */
+  runJob() {
+    try {
+      this.chip.runUntil(this.time.nanos + 60e9);
+    } catch (error) {
+      if (!(error instanceof Stopped)) throw error;
+      if (error.reason === 'next job') return this.cycles;
+      throw new Error(`the image stopped: ${error.reason}; ${this.report.list.map((e) => Report.line(e)).join('; ')}`);
+    }
+    throw new Error('a job takes longer than a minute');
+  }
 
   /** @returns {{cycles, x_mm, y_mm}} of one fit */
   run({ kernel, iterations = 0, noise_Pa_q10 = 1, usable = 0, own = false, readings = [] }) {
@@ -21,9 +61,9 @@ export class Bench extends JobBench {
     const values = { kernel: KERNELS.indexOf(kernel), iterations, noise_Pa_q10, usable, own: own ? 1 : 0 };
     for (const [field, value] of Object.entries(values)) job.setInt32(4 * FIELDS[field], value, true);
     readings.forEach((value, k) => job.setInt32(4 * (FIELDS.readings + k), value, true));
-    const [cycles] = this.runJob();
+    const cycles = this.runJob();
     return {
-      cycles: cycles - (this.overhead ?? 0),
+      cycles: cycles - this.overhead,
       x_mm: job.getFloat32(4 * FIELDS.x_mm, true),
       y_mm: job.getFloat32(4 * FIELDS.y_mm, true),
     };
