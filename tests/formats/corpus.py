@@ -184,6 +184,8 @@ def csv_cases(corpus, name, text, devices):
         rows = [[each.replace(".", "," if "comma" in what else ".") for each in line.split(",")] for line in lines]
         filled = [f'"{line}"' + 9 * cell[-1] if "q" in what else line + 9 * cell[-1] for line in lines]
         add(what, [fill if "#" in fill else "".join(map(cell.format, row)) for fill, row in zip(filled, rows)], f"{name}_whole")
+    quoted = [re.sub(r"([^,]*)\.([^,]*)", r'"\1,\2"', line) if line[:1].isdigit() else line + 9 * "," * (line[:1] == "#") for line in lines]
+    add("decimal_commas_in_quotes", quoted, f"{name}_whole")
     add("twice", text + text)
     add("note", [*lines[:row], "# 12:30 object placed", "#", *lines[row:]])
     add("no_info_packet", [line for line in lines if "packet: info" not in line])
@@ -347,6 +349,17 @@ def cases_by_others(corpus, name, bag, devices):
             corpus.recording(f"{name}_unlisted", data[:at] + b"\x7f" + data[at + 1 :], "mcap", devices, f"{name}_whole", False)
     for pack in (zstandard.compress, gzip.compress, lz4.frame.compress, bz2.compress, lzma.compress):
         corpus.recording(f"{name}_packed_as_a_whole_by_{pack.__module__.split('.')[0]}", pack(bag.read_bytes()), "mcap", devices)
+
+
+def circular_index():
+    """An index whose chunks are one within the other, the inner one the earlier: from the end of both it leads back to the outer one."""
+    ends_both = b"\x80" + struct.pack("<Q", 20) + bytes(20)
+    outer = b"\x81" + struct.pack("<Q", 11 + len(ends_both)) + bytes(11) + ends_both
+    head = b"\x89MCAP0\r\n\1" + struct.pack("<QII", 8, 0, 0)
+    at, summary = len(head), len(head + outer)
+    indexes = [(10, at), (5, at + 20)]
+    chunks = [b"\x08" + struct.pack("<QQQQQIQIQQ", 64, begin_ns, begin_ns, place, 9, 0, 0, 0, 0, 0) for begin_ns, place in indexes]
+    return head + outer + b"".join(chunks) + b"\2" + struct.pack("<QQQI", 20, summary, 0, 0) + head[:8]
 
 
 def part_cases(corpus, text, convert):
@@ -598,6 +611,7 @@ def make(folder, convert):
         if name == "one":
             inner_cases(corpus, messages_of(by_tool), devices)
     part_cases(corpus, one, convert)
+    corpus.recording("circular_index", circular_index(), "mcap")
     lines, bag = lines_of(two), corpus.folder / "start_many.mcap"
     rows = [line.replace("000.5", f"{time:03}.5", 1) for time in (*range(40), *range(30, 70)) for line in lines if line[0].isdigit()]
     start.write_bytes(text_of([*lines[: header_at(lines) + 1], *rows, lines[-1]]))

@@ -430,7 +430,7 @@ bool Reader::read_record() {
     ended_ = true;
     return false;
   }
-  const auto end = record_ + static_cast<std::streamoff>(sizeof head + length);
+  auto end = record_ + static_cast<std::streamoff>(sizeof head + length);
   if (opcode == FOOTER && is_behind_) {
     char behind[sizeof MAGIC];
     const auto begin = static_cast<std::uint64_t>(end) + sizeof MAGIC;
@@ -443,7 +443,12 @@ bool Reader::read_record() {
     return false;
   }
   const auto summary = static_cast<std::streamoff>(summary_.value_or(0));
-  const auto jump = after_.find(opcode == DATA_END ? summary : end);
+  end = opcode == DATA_END && !after_.empty() ? summary : end;
+  const auto within = after_.upper_bound(record_);
+  if (within != after_.end() && within->first < end) {
+    after_.clear(); /* it would lead round in circles */
+  }
+  const auto jump = after_.find(end);
   const auto next = jump == after_.end() ? end : jump->second;
   const auto go_on = [&] {
     next_ = next;

@@ -27,6 +27,7 @@ public:
     const std::size_t filled = text.find_last_not_of(",;\t") + 1;
     fill_ = line.number == 1 ? text.substr(filled, filled < text.size()) : fill_;
     const bool is_quoted = text.rfind("\"#", 0) == 0;
+    is_one_ = is_one_ || (line.number == 1 && (is_quoted || !fill_.empty()));
     if (is_quoted || text.rfind('#', 0) == 0) {
       text.erase(fill_.empty() ? text.size() : text.find_last_not_of(fill_) + 1);
       text = is_quoted ? text.substr(1, text.size() - 1 - (text.back() == '"')) : text;

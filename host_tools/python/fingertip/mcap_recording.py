@@ -3,6 +3,7 @@
 Needs the package mcap.
 """
 
+import bisect
 import calendar
 import collections
 import functools
@@ -441,6 +442,7 @@ class McapLineReader:
                     raise InputError(f"{self.path}: no MCAP file; give one that fingertip has written")
                 spans, summary = self._index(file)
                 after = self._jumps(spans, summary)
+                places = sorted(after)
                 is_skipping = is_behind = False
                 at = file.seek(len(MAGIC))
                 while at < size:  # a killed writer leaves whole chunks
@@ -476,8 +478,11 @@ class McapLineReader:
                     except damage as error:
                         what = "it ends within a field" if isinstance(error, struct_error) else error
                         yield Damaged(f"{self.path}: damaged at byte {at} ({what}); use --salvage to skip the chunk")
-                    end = at + 9 + length
-                    at = file.seek(after.get(summary if head[0] == _DATA_END else end, end))
+                    end = summary if after and head[0] == _DATA_END else at + 9 + length
+                    inside = bisect.bisect(places, at)
+                    if inside < len(places) and places[inside] < end:
+                        after, places = {}, []  # it would lead round in circles
+                    at = file.seek(after.get(end, end))
                     is_behind = is_behind or (at == summary if after else head[0] == _DATA_END)
                 if self._topic and not self._is_torn:
                     yield self._count + 1, "# end: reason=topics", False
