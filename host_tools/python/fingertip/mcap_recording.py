@@ -308,22 +308,6 @@ def _length_of(layout: np.dtype[Any]) -> int:
     return int(at + kind.itemsize)
 
 
-def _shortest(values: npt.NDArray[np.float32]) -> npt.NDArray[np.float64]:
-    """The number of the shortest text that reads back the same binary32."""
-    shape, values = values.shape, values.ravel()
-    exact = values.astype(np.float64)
-    size = np.abs(exact)
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        scale = 10.0 ** np.clip(5 - np.floor(np.log10(size)), -30, 40)
-        found = np.rint(exact * scale) / scale
-        for more in (10.0, 100.0, 1000.0):
-            wrong = np.flatnonzero(found.astype(np.float32) != values)
-            if not len(wrong):
-                break
-            found[wrong] = np.rint(exact[wrong] * scale[wrong] * more) / (scale[wrong] * more)
-    return np.where((found.astype(np.float32) == values) & (size > 0), found, exact).reshape(shape)
-
-
 class McapLineReader:
     """The lines of a recording in an MCAP file, in the order of their numbers, in whatever order a tool has written them.
 
@@ -651,7 +635,7 @@ class McapLineReader:
             found = padded.view(layout).ravel()
             if self._topic:
                 found["time_us"] = math.nan  # a recording of one
-            table[at], fine[at] = rows.of_contacts(found, sensors, _shortest)
+            table[at], fine[at] = rows.of_contacts(found, sensors)
             devices[at], times_us[at] = found["device"], np.round(found["time_us"], 1)
             fine[at] &= (frame_ids == frame_ids[0]) & (np.isnan(found["time_us"]) != bool(self._is_joint)) & ~np.isinf(found["time_us"])
         numbers = np.array(contacts.numbers, "Q")

@@ -4,7 +4,7 @@ import io
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -167,6 +167,7 @@ class Rows:
         wires = {"sequence": Wire("H"), **dict(layout_of(Contact))}
         contact = [wires[name] for name in self.names[2 : self._first_raw]]
         self._codes = ["Q", "I", *(wire.code for wire in contact), "H", "I", "I", "I", "I", "h", *"i" * 2 * self.sensors]
+        self.codes = dict(zip(self.names, self._codes))
         self._flags = {at: int(wire.when[1]) for at, wire in enumerate(contact, 2) if wire.code == "f" and wire.when}
         most = {"f": 3.4e38, "h": 327.67, "i": 2097151.999}  # what is beyond is judged by values
         self._high = np.array([most.get(code) or np.nextafter(_LARGEST[code] + 1.0, 0) for code in self._codes])
@@ -221,28 +222,23 @@ class Rows:
                 return None
         return None if (flags & self._untold).any() or empty[has_raw, first_raw:].any() else table
 
-    def of_contacts(
-        self, found: npt.NDArray[Any], sensors: int, shortest: Callable[[npt.NDArray[np.float32]], Array]
-    ) -> tuple[Array, npt.NDArray[np.bool_]]:
+    def of_contacts(self, found: npt.NDArray[Any], sensors: int) -> tuple[Array, npt.NDArray[np.bool_]]:
         """As table, of messages fingertip_msgs/Contact with this number of pressures, by the names of their fields; and whether each is a row of
-        this recording. shortest: of binary32."""
+        this recording."""
         has_contact, has_raw = found["has_contact"] != 0, found["has_raw"] != 0
         first_raw, last = self._first_raw, self._first_raw + len(RAW_COLUMNS)
         table = np.full((len(found), len(self.names)), math.nan)
         floats = [at for at in range(2, first_raw) if self._codes[at] == "f"]
-        values = np.stack([found[self.names[at].lower()] for at in floats], axis=1)
-        bits = np.array([self._flags[at] for at in floats], np.uint32)
-        wrong = np.isinf(values) | (np.isnan(values) & ((found["flags"][:, None] & bits) != 0))
-        fine = (has_contact | has_raw) & ~(has_contact & (wrong.any(axis=1) | ((found["flags"] & self._untold) != 0)))
-        table[:, floats] = shortest(values)
-        for at in (at for at in range(last - 1) if self._codes[at] != "f"):
+        for at in range(last - 1):
             table[:, at] = found[self.names[at].lower()]
+        bits = np.array([self._flags[at] for at in floats], np.uint32)
+        wrong = np.isinf(table[:, floats]) | (np.isnan(table[:, floats]) & ((found["flags"][:, None] & bits) != 0))
+        fine = (has_contact | has_raw) & ~(has_contact & (wrong.any(axis=1) | ((found["flags"] & self._untold) != 0)))
         table[~has_contact, 2:first_raw] = math.nan
         fine &= ~has_raw | ((found["pressure_pa_count"] == self.sensors) & (found["tare_pa_count"] == self.sensors) & (sensors > 0))
         if sensors:
-            table[:, last - 1] = np.round(found["temperature_degc"], 2)
-            pressures = [found[name].reshape(len(found), sensors) for name in ("pressure_pa", "tare_pa")]
-            table[:, last:] = np.round(np.concatenate(pressures, axis=1), 4)
+            table[:, last - 1] = found["temperature_degc"]
+            table[:, last : last + sensors], table[:, last + sensors :] = found["pressure_pa"], found["tare_pa"]
             scaled = np.rint(table[:, last - 1 :] * np.where(np.arange(1 + 2 * sensors) == 0, 100, Q10))
             most = np.where(np.arange(1 + 2 * sensors) == 0, 2.0**15, 2.0**31)
             fine &= ~has_raw | ((scaled >= -most) & (scaled < most)).all(axis=1)

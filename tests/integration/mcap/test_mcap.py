@@ -93,7 +93,7 @@ class TestMcap(unittest.TestCase):
             self.assertEqual((len(lines[0]), [line for line in changed if not line[:1].isdigit()]), (len(lines[1]), []), number)
             if changed:
                 there, here = (read_recording(file, salvage=True, serial="AAAA") for file in (path, back))
-                self.assertEqual(repr((there.columns, there.sensors_Pa)), repr((here.columns, here.sensors_Pa)), number)
+                self.assertEqual(repr((dict(there.columns), there.sensors_Pa)), repr((dict(here.columns), here.sensors_Pa)), number)
         path.write_bytes(text + b"# note: \xff\n")
         self.assertIn("is no UTF-8 text, which an MCAP file cannot hold", self.refused("convert", path, self.folder / "no.mcap"))
 

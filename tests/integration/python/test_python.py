@@ -3,6 +3,7 @@
 import contextlib
 import importlib
 import io
+import itertools
 import json
 import math
 import os
@@ -11,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tracemalloc
 import unittest
 from unittest import mock
 
@@ -21,11 +23,38 @@ sys.path.insert(0, str(TOOLS))
 
 from fingertip import Flag, files  # noqa: E402
 from fingertip import plot  # noqa: E402
+from fingertip.columns import Columns  # noqa: E402
 from fingertip.wire import Health  # noqa: E402
 
 RECORDING_COLUMNS = ("t_us", "frame", *files.CONTACT_COLUMNS, *files.LATER_COLUMNS, *files.RAW_COLUMNS)
 
 CONTACT, FIT_VALID, SLIP_VALID, SLIP, TARED = 1, 2, 8, 16, 32
+
+
+class ColumnsTest(unittest.TestCase):
+    CODES = {"t_us": "Q", "frame": "I", "sequence": "H", "flags": "I", "x_mm": "f", "temperature_degC": "h", "s0_Pa": "i", "tare0_Pa": "i"}
+
+    def test_numbers_come_back_and_take_what_they_need(self):
+        prng, count, gap = np.random.default_rng(3), 20_000, np.arange(20_000) % 7000 < 20
+        rows, far = np.arange(count), prng.integers(-(2**31), 2**31, count)
+        counted = [1_000_000 + np.round(763.9 * rows) + prng.integers(0, 3, count), rows + 5.0, 2.0 * rows % 65536]
+        values = np.float32(prng.normal(size=count)).tolist()
+        sent = [prng.choice((32, 5243055), count), [float(str(np.float32(value))) for value in values], prng.integers(-99, 99, count) / 100]
+        table = np.array([*counted, *sent, np.round(far / 1024, 4), np.full(count, 101325.5)]).T
+        table[9000, 0] = 2.0**60  # beyond what is narrow
+        table[gap, 3:] = math.nan
+        columns = Columns(self.CODES, list(self.CODES)[:6], ["x1_mm"])
+        tracemalloc.start()
+        self.addCleanup(tracemalloc.stop)
+        for begin, end in itertools.pairwise((0, 1, 5000, 5000, 18_000, count)):
+            columns.append(table[begin:end], range(begin + 9, end + 9), rows[begin:end] / 8)
+        self.assertLess(tracemalloc.get_traced_memory()[0] / count, 24, "bytes of a row: where doubles take 80")
+        for at, name in enumerate(columns):
+            np.testing.assert_array_equal(columns[name], table[:, at] if at < 6 else math.nan, name)
+        np.testing.assert_array_equal(columns.take(["tare0_Pa", "s0_Pa"]), table[:, :5:-1])
+        np.testing.assert_array_equal(columns.take(["line", "time_us"]).T, [rows + 9, rows / 8])
+        self.assertIs(columns["x_mm"], columns["x_mm"])
+        self.assertNotIn("s0_Pa", columns)
 
 
 class ToolTest(unittest.TestCase):
