@@ -105,6 +105,7 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
   if (sliding_) {
     slides_ += was_sliding ? 0 : 1;
     slid_s_ = now_s;
+    place_N_ = was_sliding || !by_place_ ? place_N_ : GROWN * settings.margin * readings.grip_N;
     if (goes_on_) {
       lately_ = std::max(lately_, readings.ratio);
       readings.by_place ? void() : friction_.slid(readings.ratio, lately_);
@@ -143,8 +144,11 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
   const double least_N = !has_seen_load_ && !readings.has_load ? settings.unseen_N()
                          : was_loaded_                         ? settings.floor_N + late_N
                                                                : settings.first_N();
-  double need = std::max(need_N(settings, readings.delay_s, dead_s), least_N);
-  need = std::min({need, settings.cap_N, by_place_ && slides_ == 0 ? settings.unseen_N() : settings.cap_N}); // places may drift
+  double need = need_N(settings, readings.delay_s, dead_s);
+  if (by_place_) { // which may drift: it opens nothing, and raises only what has not slid up to unseen_N
+    need = place_N_ = std::max(place_N_, slides_ > 0 ? need : std::min(need, settings.unseen_N()));
+  }
+  need = std::min(std::max(need, least_N), settings.cap_N);
   is_set_ = settings.sets_force() && need == least_N && !is_loaded() && slides_ == 0;
   // A force that was wanted and is not under way is given up: the load that it was for has not come.
   if (readings.has_load && !goes_on_) {

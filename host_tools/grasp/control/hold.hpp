@@ -61,7 +61,7 @@ private:
 
   GripFriction friction_;
   GripLoad load_;
-  double wanted_N_ = 0.0;
+  double wanted_N_ = 0.0, place_N_ = 0.0; // place_N_: the most that a load by the place has needed
   double now_s_ = 0.0, updated_s_ = 0.0;
   double slid_s_ = 0.0; // time of the last frame of a slide
   double fastest_mm_s_ = 0.0;

@@ -207,7 +207,7 @@ static GripWorld blind_world(double sigma_mm) {
   return world;
 }
 
-// Without a tangential force the place shows the load; one frame shows nothing.
+// Without a tangential force the place shows the load; one frame shows nothing, and a place that drifts back opens nothing.
 TEST(Grip, IsAsFirmAsThePlaceShows) {
   for (const auto &[load_N, sigma_mm] : {std::pair(0.3, 6.0), {0.8, 6.0}, {1.5, 6.0}, {0.8, 9.0}}) {
     GripWorld world = blind_world(sigma_mm);
@@ -228,7 +228,7 @@ TEST(Grip, IsAsFirmAsThePlaceShows) {
     EXPECT_LT(world.peak_N, 1.2 * before_N) << load_N;
     world.pull(0.0, 0.3);
     world.run(1.5);
-    EXPECT_LT(world.force_N, std::max(0.6 * wanted_N, 1.4 * world.settings.floor_N)) << load_N;
+    EXPECT_GT(world.force_N, 0.97 * wanted_N) << load_N;
   }
 }
 
