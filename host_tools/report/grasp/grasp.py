@@ -44,7 +44,7 @@ def measure(options):
 def main(argv):
     parser = option_parser(__doc__, boards=True)
     parser.add_argument("--seed", type=int, default=SEED, metavar="N", help="1000 or more; default %(default)s")
-    parser.add_argument("--usual", action="store_true", help="a seventh of the grasps")
+    parser.add_argument("--usual", action="store_true", help="a tenth of the grasps")
     parser.add_argument("--grasps", type=int, metavar="N", help="of each row")
     parser.add_argument("--no-emulated", action="store_true", help="without the grasp of two emulated fingertips")
     options = parser.parse_args(argv)

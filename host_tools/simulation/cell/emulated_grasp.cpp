@@ -46,8 +46,7 @@ constexpr int CLOCK_EXCHANGES = 8;
 constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 constexpr double MOVES_s = 2.5e-4; // between two samples of the gripper
-// Cast pads differ by 8 %, a calibration finds that to 1.2 %: the report's part truth.
-constexpr double PAD_SD = 0.08, CALIBRATION_SD = 0.012, FORCE_SCALE_SD = 0.05;
+constexpr double PAD_SD = 0.08;    // of cast pads: the report's part truth
 constexpr double MORE_LOAD = 1.1, MORE_LOAD_N = 0.1;
 
 // A fingertip that is an emulated board, from the host's end of its USB line: it gets its pad's profile and its calibration first, then it
@@ -59,7 +58,7 @@ public:
     for (std::size_t k = 0; k < SENSORS; k++) {
       gain_[k] = 1.0 + PAD_SD * std::clamp(random.normal(), -3.0, 3.0);
     }
-    const calibration stored = calibrated(gain_, CALIBRATION_SD, 1.0 / static_cast<double>(profile.force_ratio), FORCE_SCALE_SD, random);
+    const calibration stored = calibrated(gain_, GAIN_SD, 1.0, profile, random);
     commands_ = {command_pad(profile), command_calibrate(stored, geometry.sensor_count)};
     commands_.insert(commands_.end(), CLOCK_EXCHANGES, command_stream(0));
     commands_.push_back(command_stream(WIRE_STREAM_CONTACT));

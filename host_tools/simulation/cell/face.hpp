@@ -34,11 +34,10 @@ public:
   // Solved once and kept in the cache (contact_table.hpp). Throws std::runtime_error for a name that there is not.
   Face(const std::string &name, double layer_mm, const std::filesystem::path &cache);
 
-  // Some 5 us for each NODE_mm of a line, 100 us for an area of the pad's size.
   Pressures base_Pa(const Patch &patch) const;
 
 private:
-  static constexpr double NODE_mm = 8.0; // apart at most: two thirds of the usual thickness
+  static constexpr double NODE_mm = 11.0; // apart at most
 
   void add(const twin::Touch &touch, Pressures &base_Pa) const;
 

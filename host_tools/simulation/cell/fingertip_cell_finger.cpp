@@ -30,7 +30,6 @@ namespace {
 
 enum Stream : std::uint64_t { CALIBRATION = 841 };
 
-constexpr double FORCE_SCALE_SD = 0.02; // of a calibration by a weight
 constexpr std::uint64_t COMMAND_us = 100'000, SETTLED_us = 1'500'000;
 
 class Fingertip {
@@ -95,7 +94,7 @@ private:
 
   void calibrate(double sd) {
     Random random(finger_.seed, CALIBRATION, 0);
-    const calibration stored = calibrated(finger_.gain, sd, 1.0 / static_cast<double>(pad_.force_ratio), FORCE_SCALE_SD, random);
+    const calibration stored = calibrated(finger_.gain, sd, 1.0, pad_, random);
     order(command_calibrate(stored, geometry.sensor_count));
   }
 

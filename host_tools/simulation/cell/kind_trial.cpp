@@ -28,8 +28,6 @@ constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 // stages of the emulated chip at 410 Hz add up to some 1.6 ms after the conversion.
 constexpr double CONVERSION_s = 2.3e-3, PROCESSING_s = 1.6e-3;
 constexpr double NOISE_Pa = 5.0, STARTS_s = 2.0; // of a sensor; until it has a zero
-// A calibration finds the gains of a cast pad to 1.2 %: the report's part truth.
-constexpr double CALIBRATION_SD = 0.012, FORCE_SCALE_SD = 0.02;
 constexpr double STEPS_s = 0.01, PATIENCE_s = 12.0, SAMPLED_s = 2e-3;
 constexpr double NEAR = 0.1, SETTLED_s = 0.5; // of a set force
 constexpr double APART_mm = 1e3, FREE_mm = 0.5, TOUCHED_N = 0.05, LOST_N = 0.01;
@@ -51,8 +49,7 @@ public:
     const pad_profile profile = pad::profile_over_own_sensors({LAYER_mm, 0.0, false});
     Pressures gain{};
     std::transform(rubber_.gain_errors().begin(), rubber_.gain_errors().end(), gain.begin(), [](double error) { return 1.0 + error; });
-    const calibration stored =
-        calibrated(gain, CALIBRATION_SD, kind_.gain / static_cast<double>(profile.force_ratio), FORCE_SCALE_SD, random_);
+    const calibration stored = calibrated(gain, GAIN_SD, kind_.gain, profile, random_);
     firmware_.reset(native_stages_new(&stored, trial.estimates_load ? &profile : nullptr));
     for (double t_s = 0.0; t_s < STARTS_s; t_s += period_s_) {
       frame(t_s, {});

@@ -12,6 +12,7 @@ struct native_stages {
   struct scan scan; /* only asked for temperatures, which never come */
   struct calibration calibration;
   struct pad_profile profile;
+  uint64_t second_us; /* the last one's */
 };
 
 struct native_stages *native_stages_new(const struct calibration *calibration, const struct pad_profile *profile) {
@@ -46,7 +47,8 @@ void native_stages_frame(struct native_stages *all, uint64_t t_us, const int32_t
   packet->t_us = t_us;
   stages_put_contact(&all->stages, &all->found, &packet->body.contact);
   stages_follow(&all->stages, &all->found, &all->scan);
-  if (frame->number % 256 == 0) {
+  if (t_us >= all->second_us + 1000000u) {
+    all->second_us = t_us;
     stages_each_second(&all->stages, &all->found);
   }
 }

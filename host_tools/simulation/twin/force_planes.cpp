@@ -8,7 +8,7 @@ namespace fingertip::twin {
 namespace {
 
 // Weights of the cubic through four equally spaced nodes, at `t` between the second and the third.
-std::array<double, 4> cubic(double t) {
+inline std::array<double, 4> cubic(double t) {
   return {-t * (t - 1.0) * (t - 2.0) / 6.0, (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0, -(t + 1.0) * t * (t - 2.0) / 2.0,
           (t + 1.0) * t * (t - 1.0) / 6.0};
 }
@@ -48,19 +48,18 @@ double ForcePlanes::at(double force_N, double dx_mm, double dy_mm) const {
   of_x[0] *= i == 0 ? sign(-1.0, in_x_) : 1.0;
   of_y[0] *= j == 0 ? sign(-1.0, in_y_) : 1.0;
   const Between force = between(force_N);
+  const std::size_t plane = std::size_t(nodes_) * std::size_t(nodes_);
+  const float *values = values_.data() + std::size_t(force.first) * plane;
   double sum = 0.0;
-  for (int f = 0; f < 4; f++) {
-    const float *plane = values_.data() + std::size_t((force.first + f) * nodes_ * nodes_);
-    double over_x = 0.0;
-    for (int a = 0; a < 4; a++) {
-      const float *line = plane + std::abs(i + a - 1) * nodes_;
-      double over_y = 0.0;
-      for (int b = 0; b < 4; b++) {
-        over_y += of_y[std::size_t(b)] * static_cast<double>(line[std::abs(j + b - 1)]);
+  for (int a = 0; a < 4; a++) {
+    for (int b = 0; b < 4; b++) {
+      const float *value = values + std::abs(i + a - 1) * nodes_ + std::abs(j + b - 1);
+      double over_forces = 0.0;
+      for (std::size_t f = 0; f < 4; f++) {
+        over_forces += force.weight[f] * static_cast<double>(value[f * plane]);
       }
-      over_x += of_x[std::size_t(a)] * over_y;
+      sum += of_x[std::size_t(a)] * of_y[std::size_t(b)] * over_forces;
     }
-    sum += force.weight[std::size_t(f)] * over_x;
   }
   return sum * force_N * sign(dx_mm, in_x_) * sign(dy_mm, in_y_);
 }
