@@ -38,14 +38,15 @@ class Columns(Mapping[str, Array]):
 
     def __init__(self, codes: Mapping[str, str], shown: Sequence[str], absent: Sequence[str]) -> None:
         """codes: struct's, by names. shown: the names to be asked for; absent: those that have no number."""
-        self._codes = {**codes, _LINE: "Q", _TIME: "d"}
+        self._codes = {_TIME: "d", _LINE: "Q", **codes}
         self._shown, self._absent = shown, absent
         names = list(self._codes)
         self._floats = [at for at, name in enumerate(names) if self._codes[name] == "f"]
         self._whole = [at for at, name in enumerate(names) if self._codes[name] not in "fd"]
         self._counting = [(row, at) for row, at in enumerate(self._whole) if names[at] in _COUNTING]
-        self._scales = np.array([[_SENT.get(self._codes[names[at]], (1.0, 0))[0]] for at in self._whole])
-        self._waiting = np.empty((_BLOCK_rows, len(names)))
+        scales = [_SENT[self._codes[names[at]]][0] if self._codes[names[at]] in _SENT else 1.0 for at in self._whole]
+        self._scales, self._unscaled = np.array(scales)[:, None], scales.count(1.0)
+        self._waiting = np.empty((len(names), _BLOCK_rows))
         self._filled = 0
         self._blocks: list[tuple[int, list[Any]]] = []  # rows, and of each column one number for all or an array
         self._made: dict[str, Array] = {}
@@ -56,9 +57,9 @@ class Columns(Mapping[str, Array]):
         at = 0
         while at < len(table):
             to = min(len(table), at + _BLOCK_rows - self._filled)
-            rows = self._waiting[self._filled : self._filled + to - at]
-            rows[:, :-2], rows[:, -2] = table[at:to], lines[at:to]
-            rows[:, -1] = times_us[at:to] if len(times_us) else np.nan
+            rows = self._waiting[:, self._filled : self._filled + to - at]
+            rows[0] = times_us[at:to] if len(times_us) else np.nan
+            rows[1], rows[2:] = lines[at:to], table[at:to].T
             self._filled += to - at
             at = to
             if self._filled == _BLOCK_rows:
@@ -66,28 +67,32 @@ class Columns(Mapping[str, Array]):
         self.rows += len(table)
 
     def _pack(self) -> None:
-        table = self._waiting[: self._filled].T
-        block: list[Any] = [self._all_or_one(table[-1].copy())] * len(table)
-        floats = table[self._floats].astype(np.float32)
-        for at, values in zip(self._floats, floats):
+        table = self._waiting[:, : self._filled]
+        block: list[Any] = [self._all_or_one(table[0])] * len(table)
+        for at, values in zip(self._floats, table[self._floats].astype(np.float32)):
             block[at] = self._all_or_one(values)
-        whole = table[self._whole] * self._scales
-        whole = np.trunc(whole + np.copysign(0.5, whole))
+        whole = table[self._whole]
+        scaled = whole[self._unscaled :]  # these come last
+        scaled *= self._scales[self._unscaled :]
+        scaled += np.copysign(0.5, scaled)
+        np.trunc(scaled, out=scaled)
         steps = dict.fromkeys(self._whole, 0.0)
         for row, at in self._counting:
             step = (whole[row, -1] - whole[row, 0]) / max(self._filled - 1, 1)
             if np.isfinite(step):
                 whole[row] -= np.rint(np.arange(self._filled) * step)
                 steps[at] = float(step)
-        least, most = np.fmin.reduce(whole, axis=1).tolist(), np.fmax.reduce(whole, axis=1).tolist()
-        has_gaps = np.isnan(whole.min(axis=1)).tolist()
-        for at, values, low, high, gaps in zip(self._whole, whole, least, most, has_gaps):
+        least, most = whole.min(axis=1).tolist(), whole.max(axis=1).tolist()
+        for row, (at, values, low, high) in enumerate(zip(self._whole, whole, least, most)):
+            if low != low:
+                low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
+                values = np.where(np.isnan(values), low - 1, values)
             if not high - low < _NARROW:
-                block[at] = self._all_or_one(table[at].copy())
+                block[at] = self._all_or_one(table[at] * self._scales[row])
                 continue
-            offsets = (np.nan_to_num(values - (low - 1)) if gaps else values - (low - 1)).astype("<u4")  # from 1; 0 is a gap
-            width = (int(high - low + 1).bit_length() + 7) // 8 if gaps or high > low else 0
-            block[at] = low - 1, steps[at], offsets.view(np.uint8).reshape(-1, 4)[:, :width].copy() if width else None
+            width = (int(high - low + 1).bit_length() + 7) // 8 if least[row] != high else 0
+            offsets = (values - (low - 1)).astype("<u4") if width else None  # from 1; 0 is a gap
+            block[at] = low - 1, steps[at], offsets.view(np.uint8).reshape(-1, 4)[:, :width].copy() if offsets is not None else None
         self._blocks.append((self._filled, block))
         self._filled = 0
 

@@ -19,6 +19,7 @@ import io
 import json
 import math
 import os
+import re
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -27,12 +28,12 @@ import numpy as np
 import numpy.typing as npt
 
 from . import line, recorded
-from .columns import Columns
+from .columns import Array, Columns
 from .errors import InputError
 from .frames import Edge, frame_of
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
 from .mcap_recording import MAGIC, Contacts, Damaged, Line, LogClock, McapLineReader, Skipped
-from .recorded import OF_SPREADSHEETS, Array, Rows, counts_of, judge_key, packet_of, restored
+from .recorded import OF_SPREADSHEETS, Rows, counts_of, judge_key, packet_of, restored
 
 if TYPE_CHECKING:
     import pandas
@@ -329,10 +330,15 @@ _OTHERS = {
 
 
 class Stretch(NamedTuple):
-    """Lines one after the other, without their ends, and the first one's number."""
+    """Whole lines one after the other, and their numbers."""
 
-    number: int
-    texts: list[str]
+    numbers: range
+    lines: bytes
+
+    @property
+    def texts(self) -> list[str]:
+        """Without their ends."""
+        return self.lines.decode("utf-8", "surrogateescape").split("\n")[:-1]
 
 
 class _RecordingLines:
@@ -348,7 +354,7 @@ class _RecordingLines:
     def __iter__(self) -> Iterator[Line | Damaged]:
         for each in self.stretches():
             if isinstance(each, Stretch):
-                for number, text in enumerate(each.texts, each.number):
+                for number, text in zip(each.numbers, each.texts):
                     yield number, text, False
             elif not isinstance(each, (Contacts, Skipped)):
                 yield each
@@ -371,24 +377,28 @@ class _RecordingLines:
                     texts = file.read().decode("utf-8", "surrogateescape").split("\n" if b"\n" in start else "\r")
                     source = io.BytesIO("\n".join(restored(texts)).encode("utf-8", "surrogateescape"))
                 size, read, shown, number = os.fstat(file.fileno()).st_size, 0, 0, 1
-                while lines := source.readlines(BLOCK_bytes):
-                    block = b"".join(lines)
+                while block := source.read(BLOCK_bytes):
+                    block += source.readline()
                     read += len(block)
                     if self.progress and size > WORTH_WAITING_bytes and read - shown > size // 100:
                         shown = read
                         self.progress(read / size)
-                    torn = not block.endswith(b"\n")
-                    texts = block.decode("utf-8", "surrogateescape").removesuffix("\n").split("\n")
                     if b"\r" in block:
-                        texts = [text.rstrip("\r") for text in texts]
-                    begin = 0
-                    for at in sorted({*(at for at, text in enumerate(texts) if text[:1] in "# \t"), len(texts) - torn}):
-                        if at > begin:
-                            yield Stretch(number + begin, texts[begin:at])
-                        if at < len(texts):
-                            yield number + at, texts[at], torn and at == len(texts) - 1
-                        begin = at + 1
-                    number += len(texts)
+                        block = re.sub(rb"\r+(?=\n|\Z)", b"", block)
+                    letters = np.frombuffer(block, np.uint8)
+                    begins = np.concatenate(([0], np.flatnonzero(letters[:-1] == ord("\n")) + 1, [len(block)]))
+                    is_row = ~np.isin(letters[begins[:-1]], list(b"# \t\n"))
+                    torn = not block.endswith(b"\n")
+                    is_row[-1] &= not torn
+                    at = 0
+                    for other in (*np.flatnonzero(~is_row).tolist(), len(is_row)):
+                        if other > at:
+                            yield Stretch(range(number + at, number + other), block[begins[at] : begins[other]])
+                        if other < len(is_row):
+                            text = block[begins[other] : begins[other + 1]].decode("utf-8", "surrogateescape")
+                            yield number + other, text.removesuffix("\n"), torn and other + 1 == len(is_row)
+                        at = other + 1
+                    number += len(is_row)
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
 
@@ -474,15 +484,16 @@ class _Reading:
         if self.waits:
             numbers, texts, times_us = zip(*self.waits)
             self.waits.clear()
-            self.take(numbers, texts, damaged, times_us)
+            lines = "".join(f"{text}\n" for text in texts).encode("utf-8", "surrogateescape")
+            self.take(numbers, lines, damaged, times_us)
 
     def take(
-        self, numbers: Sequence[int], texts: Sequence[str], damaged: Callable[[int, ValueError], None], times_us: Sequence[float] = ()
+        self, numbers: Sequence[int], lines: bytes, damaged: Callable[[int, ValueError], None], times_us: Sequence[float] = ()
     ) -> None:
         """Rows and their lines' numbers."""
         assert self.rows is not None
         at = 0
-        for found in self.rows.tables(texts):
+        for found in self.rows.tables(lines):
             if isinstance(found, ValueError):
                 damaged(numbers[at], found)
                 at += 1
@@ -635,14 +646,13 @@ def read_recording(
                     follow(found[0][0], found[0][-1])
                     reading.take_contacts(*found)
         elif isinstance(each, Stretch):
-            numbers, texts = range(each.number, each.number + len(each.texts)), each.texts
             if reading.rows is None or reading.is_joint:
-                for number, text in zip(numbers, texts):
+                for number, text in zip(each.numbers, each.texts):
                     one(number, text, False)
             else:
                 reading.take_rows(wrong)
-                reading.take(numbers, texts, wrong)
-            last = numbers[-1]
+                reading.take(each.numbers, each.lines, wrong)
+            last = each.numbers[-1]
         elif last is None:
             last = 1
         else:

@@ -19,15 +19,15 @@ from collections.abc import Callable, Iterator
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from .columns import Array
 from .errors import InputError
 from .frames import Q10
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX
 from .lines import LineFile, shortest
 from .messages import CONTACT_TYPE, DIAGNOSTICS_TYPE, FRAME_TOPICS, LINE_TYPE, PRESSURES_TYPE, TYPES, FrameMessages
 from .messages import diagnostics, health_status, name_in_ros, stamp
-from .recorded import Array, Rows, header_text
+from .recorded import Rows, header_text
 from .ros_messages import CDR_LITTLE_ENDIAN, PRIMITIVES, decode, encode, fields_of, schema_of
 
 LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can hold

@@ -1,25 +1,23 @@
 """What may be in a line of a recording. What libfingertip refuses is refused here too (recording_reader.cpp; the test formats)."""
 
-import io
 import math
-import operator
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from .cells import cells_of
+from .columns import Array
 from .frames import Q10
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, SENSORS_MAX, SHAPE_COLUMNS, TANGENTIAL_COLUMNS
 from .line import Acknowledgement, Calibration, Contact, Health, Info, PadProfile, SyncEdge, Wire
 from .wire import layout_of
 
-Array = npt.NDArray[np.float64]
 _LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "h": 2**15 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
 _LEAST = {"h": -(2**15)}  # of the others 0
 _WHOLE = re.compile("-?[0-9]+")
-_EXPONENT = re.compile(rb"(?<=[,-])[1-9](?:\.[0-9]+)?e[-+][0-3][0-9](?=[,\n])")  # within binary32
 _NUMBER = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _BINARY32 = 2.0**-150, 2.0**128 - 2.0**103  # not above the first it becomes 0, from the second on infinite
 _BINARY64 = 0.0, math.inf
@@ -169,6 +167,8 @@ class Rows:
         self._codes = ["Q", "I", *(wire.code for wire in contact), "H", "I", "I", "I", "I", "h", *"i" * 2 * self.sensors]
         self.codes = dict(zip(self.names, self._codes))
         self._flags = {at: int(wire.when[1]) for at, wire in enumerate(contact, 2) if wire.code == "f" and wire.when}
+        self._floats, self._bits = list(self._flags), np.array(list(self._flags.values()), np.uint32)
+        self._whole = [at for at, wire in enumerate(contact, 2) if wire.code != "f"]
         most = {"f": 3.4e38, "h": 327.67, "i": 2097151.999}  # what is beyond is judged by values
         self._high = np.array([most.get(code) or np.nextafter(_LARGEST[code] + 1.0, 0) for code in self._codes])
         self._low = np.array([-most.get(code, 0.0) for code in self._codes])
@@ -176,51 +176,36 @@ class Rows:
         for name in self.later:
             when = wires[name].when
             self._untold |= int(when[1]) if when else 0
-        whole_columns = [at for at, code in enumerate(self._codes) if code not in "fhi"]
-        self._contact = operator.itemgetter(*(at for at in whole_columns if at < self._first_raw))
-        self._raw = operator.itemgetter(*(at for at in whole_columns if at >= self._first_raw))
+        self._has_point = np.array([code in "fhi" for code in self._codes])
 
-    def table(self, texts: Sequence[str]) -> npt.NDArray[np.float64] | None:
+    def table(self, lines: bytes) -> Array | None:
         """As values of each row, many times as fast; None where one of them is not written as writers write most: values judges it then."""
-        joined = ("\n".join(texts) + "\n").encode("ascii", "replace")
-        # What has no such run of zeros, and an exponent of its own digits alone, is 0 only where it is written so.
-        others = joined.translate(None, b"0123456789.,-\n")
-        if others.strip(b"e+") or b"0" * 40 in joined or not self.sensors:
+        found = cells_of(lines, len(self.names), self._has_point)
+        if found is None or not self.sensors:
             return None
-        if others and (len(_EXPONENT.findall(joined)) != others.count(b"e") or others.count(b"+") != joined.count(b"e+")):
-            return None
-        first_raw, last = self._first_raw, self._first_raw + len(RAW_COLUMNS)
-        has_raw = np.empty(len(texts), bool)
-        digits: list[str] = []
-        for i, text in enumerate(texts):
-            cells = text.split(",", last)
-            if len(cells) <= last:
+        table, first_raw = found.values, self._first_raw
+        for row, at, cell in found.odd:
+            if self._codes[at] != "f":
                 return None
-            digits += self._contact(cells) if cells[2] else cells[:2]
-            has_raw[i] = bool(cells[first_raw])
-            if cells[first_raw]:
-                digits += self._raw(cells)
-            elif not cells[2] or any(cells[first_raw:last]) or cells[last].strip(","):
+            try:
+                table[row, at] = number(self.names[at], cell.decode("ascii", "replace"), _BINARY32)
+            except ValueError:
                 return None
-            if not cells[2] and any(cells[2:first_raw]):
-                return None
-        if "" in digits or not "".join(digits).isdigit():
-            return None
-        filled = joined.replace(b",,", b",nan,").replace(b",,", b",nan,").replace(b",\n", b",nan\n")
-        try:
-            table: npt.NDArray[np.float64] = np.loadtxt(io.BytesIO(filled), delimiter=",", comments=None, ndmin=2)
-        except ValueError:
-            return None
-        if table.shape != (len(texts), len(self.names)):
-            return None
         if (table > self._high).any() or (table < self._low).any():
             return None
-        flags = np.nan_to_num(table[:, 3]).astype(np.uint32)
         empty = np.isnan(table)
-        for at, bit in self._flags.items():
-            if (empty[:, at] & (flags & bit != 0)).any():
-                return None
-        return None if (flags & self._untold).any() or empty[has_raw, first_raw:].any() else table
+        has_contact, has_raw = ~empty[:, 2:3], ~empty[:, first_raw : first_raw + 1]
+        flags = np.nan_to_num(table[:, 3:4]).astype(np.uint32)
+        wrong = (
+            empty[:, :2],
+            ~(has_contact | has_raw),
+            empty[:, self._whole] == has_contact,
+            ~(empty[:, 2:first_raw] | has_contact),
+            empty[:, first_raw:] == has_raw,
+            empty[:, self._floats] & ((flags & self._bits) != 0),
+            flags & self._untold,
+        )
+        return None if any(each.any() for each in wrong) else table
 
     def of_contacts(self, found: npt.NDArray[Any], sensors: int) -> tuple[Array, npt.NDArray[np.bool_]]:
         """As table, of messages fingertip_msgs/Contact with this number of pressures, by the names of their fields; and whether each is a row of
@@ -228,11 +213,10 @@ class Rows:
         has_contact, has_raw = found["has_contact"] != 0, found["has_raw"] != 0
         first_raw, last = self._first_raw, self._first_raw + len(RAW_COLUMNS)
         table = np.full((len(found), len(self.names)), math.nan)
-        floats = [at for at in range(2, first_raw) if self._codes[at] == "f"]
         for at in range(last - 1):
             table[:, at] = found[self.names[at].lower()]
-        bits = np.array([self._flags[at] for at in floats], np.uint32)
-        wrong = np.isinf(table[:, floats]) | (np.isnan(table[:, floats]) & ((found["flags"][:, None] & bits) != 0))
+        floats = table[:, self._floats]
+        wrong = np.isinf(floats) | (np.isnan(floats) & ((found["flags"][:, None] & self._bits) != 0))
         fine = (has_contact | has_raw) & ~(has_contact & (wrong.any(axis=1) | ((found["flags"] & self._untold) != 0)))
         table[~has_contact, 2:first_raw] = math.nan
         fine &= ~has_raw | ((found["pressure_pa_count"] == self.sensors) & (found["tare_pa_count"] == self.sensors) & (sensors > 0))
@@ -245,20 +229,22 @@ class Rows:
         table[~has_raw, first_raw:] = math.nan
         return table, fine
 
-    def tables(self, texts: Sequence[str]) -> Iterator[npt.NDArray[np.float64] | ValueError]:
+    def tables(self, lines: bytes) -> Iterator[Array | ValueError]:
         """All of them in their order: a count of rows, or what is wrong with one."""
-        table = self.table(texts)
+        table = self.table(lines)
         if table is not None:
             yield table
-        elif len(texts) > 1:
-            half = len(texts) // 2
-            yield from self.tables(texts[:half])
-            yield from self.tables(texts[half:])
-        else:
-            try:
-                yield np.array([self.values(texts[0])])
-            except ValueError as error:
-                yield error
+            return
+        middle = lines.find(b"\n", len(lines) // 2) + 1 or lines.find(b"\n") + 1
+        middle = middle if middle < len(lines) else lines.find(b"\n") + 1
+        if middle < len(lines):
+            yield from self.tables(lines[:middle])
+            yield from self.tables(lines[middle:])
+            return
+        try:
+            yield np.array([self.values(lines[:-1].decode("utf-8", "surrogateescape"))])
+        except ValueError as error:
+            yield error
 
     def values(self, text: str) -> list[float]:
         """A row's cells as numbers, NaN where they are empty. Raises ValueError where libfingertip finds no row in it."""

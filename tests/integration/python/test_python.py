@@ -8,6 +8,8 @@ import json
 import math
 import os
 import pathlib
+import random
+import re
 import shutil
 import subprocess
 import sys
@@ -21,7 +23,7 @@ import numpy as np
 TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools" / "python"
 sys.path.insert(0, str(TOOLS))
 
-from fingertip import Flag, files  # noqa: E402
+from fingertip import Flag, cells, files  # noqa: E402
 from fingertip import plot  # noqa: E402
 from fingertip.columns import Columns  # noqa: E402
 from fingertip.wire import Health  # noqa: E402
@@ -37,6 +39,7 @@ class ColumnsTest(unittest.TestCase):
     def test_numbers_come_back_and_take_what_they_need(self):
         prng, count, gap = np.random.default_rng(3), 20_000, np.arange(20_000) % 7000 < 20
         rows, far = np.arange(count), prng.integers(-(2**31), 2**31, count)
+        far[50:52] = -(2**31), 2**31 - 1  # as far apart as they can be
         counted = [1_000_000 + np.round(763.9 * rows) + prng.integers(0, 3, count), rows + 5.0, 2.0 * rows % 65536]
         values = np.float32(prng.normal(size=count)).tolist()
         sent = [prng.choice((32, 5243055), count), [float(str(np.float32(value))) for value in values], prng.integers(-99, 99, count) / 100]
@@ -55,6 +58,27 @@ class ColumnsTest(unittest.TestCase):
         np.testing.assert_array_equal(columns.take(["line", "time_us"]).T, [rows + 9, rows / 8])
         self.assertIs(columns["x_mm"], columns["x_mm"])
         self.assertNotIn("s0_Pa", columns)
+
+
+class CellsTest(unittest.TestCase):
+    def test_a_number_is_that_of_float_or_odd(self):
+        prng = random.Random(4)
+        kinds = [
+            lambda: b"%d" % prng.randrange(10 ** prng.randrange(1, 19)),
+            lambda: bytes(prng.choices(b"0123456789.-e/ \xff", k=prng.randrange(19))),
+        ]
+        kinds += [lambda: b"%.*f" % (prng.randrange(12), prng.gauss(0, 10 ** prng.randrange(-3, 8))), lambda: b""]
+        rows = [[prng.choice(kinds)() for _ in range(9)] for _ in range(5000)]
+        found = cells.cells_of(b"".join(b",".join(row) + b"\n" for row in rows), 9, np.arange(9) > 3)
+        odd = {(row, at): text for row, at, text in found.odd}
+        for (row, at), value in np.ndenumerate(found.values):
+            text = rows[row][at]
+            if (row, at) in odd:
+                usual = rb"[0-9]{0,15}" if at < 4 else rb"-?(?=.{2,15}$)([0-9]+\.[0-9]*|\.[0-9]+)|-?[0-9]{1,8}|"
+                self.assertIsNone(re.fullmatch(usual, odd[row, at]), "slow")
+            else:
+                self.assertEqual(repr(float(value)), repr(float(text or "nan")))
+        self.assertIsNone(cells.cells_of(b"1,2\n3\n4,5,6\n", 2, np.array([True, True])))
 
 
 class ToolTest(unittest.TestCase):
