@@ -33,7 +33,7 @@ endfunction()
 # Whether a Pico can be wired so. The multiplexed bus is I2C0, the parallel one has the lower sixteen lines of a PIO.
 function(board_judge board)
   board_get(bus ${board} bus)
-  board_number(sensors ${board} sensor_count 1 32 "1 to 32 sensors are read")
+  board_number(sensors ${board} sensor_count 1 36 "1 to 36 sensors are read")
   board_number(of_strip ${board} sensors_of_strip 1 ${sensors} "a strip has 1 to ${sensors} of the sensors")
   board_number(address ${board} sensor_address 0x76 0x77 "these sensors have the address 0x76 or 0x77")
   set(pins pin_scl pin_sync)

@@ -7,7 +7,7 @@ import dataclasses
 import json
 
 from geometry import PACKAGE_mm
-from sheet import across, circle, cross, down, rectangle, ruler, sheet, text
+from sheet import across, circle, cross, down, path, rectangle, ruler, sheet, text
 
 FLANGE_mm = 5.0  # of the skin, all around, under the frame
 FLANGE_HIGH_mm = 3.0
@@ -83,37 +83,35 @@ def scad(pad):
     return "".join(["// Written by boards/drawing/draw.py.\n", *lines, "include <../mould.scad>\n"])
 
 
+def part(x, y, words, outside, *inner, screws=()):
+    """Seen from above or below: its outline, and others about the same middle."""
+    lines = [rectangle(x, y, *size) for size in (outside, *inner)]
+    lines.append(text(x - outside[0] / 2, y - outside[1] / 2 - 5, words))
+    return lines + [circle(x + sx, y + sy, SCREW_mm) for sx, sy in screws]
+
+
+def inside(x, y, size):
+    """The measures of an opening."""
+    left, top = x - size[0] / 2 + 4, y - size[1] / 2 + 4
+    return across(left - 4, top, size[0], f"{size[0]:g}") + down(left, top - 4, size[1], f"{size[1]:g}")
+
+
 def plate(x, y, m, sensors):
-    lines = [rectangle(x, y, *m.outside), text(x - m.outside[0] / 2, y - m.outside[1] / 2 - 5, "base plate")]
-    lines += [circle(x + sx, y + sy, SCREW_mm) for sx, sy in m.screws]
+    lines = part(x, y, "base plate", m.outside, screws=m.screws)
     for k, (sx, sy) in enumerate(sensors):
         lines += [rectangle(x + sx, y - sy, m.hole_mm, m.hole_mm), cross(x + sx, y - sy, 0.6), text(x + sx + 2.2, y - sy - 2, k)]
     return lines + across(x - m.outside[0] / 2, y - m.outside[1] / 2 - 1.5, m.outside[0], f"{m.outside[0]:g}")
 
 
 def frame(x, y, m):
-    lines = [
-        rectangle(x, y, *m.outside),
-        rectangle(x, y, *m.opening),
-        rectangle(x, y, *(mm + 2 * FRAME_PLAY_mm for mm in m.flange)),
-        text(x - m.outside[0] / 2, y - m.outside[1] / 2 - 5, "frame, from below"),
-    ]
-    lines += [circle(x + sx, y + sy, SCREW_mm) for sx, sy in m.screws]
-    lines += across(x - m.opening[0] / 2, y - m.opening[1] / 2 + 4, m.opening[0], f"{m.opening[0]:g}")
-    return lines + down(x - m.opening[0] / 2 + 4, y - m.opening[1] / 2, m.opening[1], f"{m.opening[1]:g}")
+    flange = tuple(mm + 2 * FRAME_PLAY_mm for mm in m.flange)
+    return part(x, y, "frame, from below", m.outside, m.opening, flange, screws=m.screws) + inside(x, y, m.opening)
 
 
 def hollow(x, y, m):
     outside = tuple(mm + 2 * WALL_mm for mm in m.flange)
-    lines = [
-        rectangle(x, y, *outside),
-        rectangle(x, y, *m.flange),
-        rectangle(x, y, *m.skin),
-        text(x - outside[0] / 2, y - outside[1] / 2 - 5, "mould of the skin, from above"),
-    ]
-    lines += across(x - m.flange[0] / 2, y - outside[1] / 2 - 1.5, m.flange[0], f"{m.flange[0]:g}")
-    lines += across(x - m.skin[0] / 2, y - m.skin[1] / 2 + 4, m.skin[0], f"{m.skin[0]:g}")
-    return lines + down(x - m.skin[0] / 2 + 4, y - m.skin[1] / 2, m.skin[1], f"{m.skin[1]:g}")
+    lines = part(x, y, "mould of the skin, from above", outside, m.flange, m.skin) + inside(x, y, m.skin)
+    return lines + across(x - m.flange[0] / 2, y - outside[1] / 2 - 1.5, m.flange[0], f"{m.flange[0]:g}")
 
 
 def section(x, base_y, m, pad):
@@ -124,14 +122,11 @@ def section(x, base_y, m, pad):
     lines.append(rectangle(x, base_y + pad.high_mm / 2, 2 * outside, pad.high_mm))
     for sx in sorted({sx for sx, _ in pad.places}):
         lines.append(rectangle(x + sx, base_y + pad.high_mm / 2, PACKAGE_mm, pad.high_mm, "cut"))
-    lines.append(
-        f'  <path class="cut" d="M{x - flange:g} {base_y:g}v{-low:g}h{flange - half:g}v{low - high:g}h{2 * half:g}v{high - low:g}h{flange - half:g}v{low:g}z"/>'
-    )
+    step = f"h{flange - half:g}"
+    lines.append(path("cut", f"M{x - flange:g} {base_y:g}v{-low:g}{step}v{low - high:g}h{2 * half:g}v{high - low:g}{step}v{low:g}z"))
     for side in (-1, 1):
-        at = x + side * outside
-        lines.append(
-            f'  <path d="M{at:g} {base_y:g}v{-(low + LID_mm):g}H{x + side * m.opening[0] / 2:g}v{LID_mm:g}H{x + side * (flange + FRAME_PLAY_mm):g}v{low:g}z"/>'
-        )
+        far, near, ring = (x + side * mm for mm in (outside, m.opening[0] / 2, flange + FRAME_PLAY_mm))
+        lines.append(path("", f"M{far:g} {base_y:g}v{-(low + LID_mm):g}H{near:g}v{LID_mm:g}H{ring:g}v{low:g}z"))
     lines += down(x + half - 6, base_y - high, high, f"{high:g}") + across(x - half, base_y - high + 3, 2 * half, f"{m.skin[0]:g}")
     return lines + down(x + outside + 2, base_y - low, low, f"{low:g}")
 

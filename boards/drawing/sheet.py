@@ -17,8 +17,14 @@ def rectangle(x, y, width, height, kind=""):
     return f'  <rect{name} x="{number(x - width / 2)}" y="{number(y - height / 2)}" width="{number(width)}" height="{number(height)}"/>'
 
 
-def circle(x, y, diameter):
-    return f'  <circle cx="{number(x)}" cy="{number(y)}" r="{number(diameter / 2)}"/>'
+def circle(x, y, diameter, kind=""):
+    name = f' class="{kind}"' if kind else ""
+    return f'  <circle{name} cx="{number(x)}" cy="{number(y)}" r="{number(diameter / 2)}"/>'
+
+
+def path(kind, d):
+    name = f' class="{kind}"' if kind else ""
+    return f'  <path{name} d="{d}"/>'
 
 
 def text(x, y, words, kind="", anchor="start"):
@@ -27,13 +33,13 @@ def text(x, y, words, kind="", anchor="start"):
 
 
 def cross(x, y, arm):
-    return f'  <path d="M{number(x - arm)} {number(y)}h{number(2 * arm)}M{number(x)} {number(y - arm)}v{number(2 * arm)}"/>'
+    return path("", f"M{number(x - arm)} {number(y)}h{number(2 * arm)}M{number(x)} {number(y - arm)}v{number(2 * arm)}")
 
 
 def across(x, y, width, words):
     """A measure from x to x + width."""
     return [
-        f'  <path class="measure" d="M{number(x)} {number(y - 1)}v2M{number(x)} {number(y)}h{number(width)}m0 -1v2"/>',
+        path("measure", f"M{number(x)} {number(y - 1)}v2M{number(x)} {number(y)}h{number(width)}m0 -1v2"),
         text(x + width / 2, y - 0.8, words, "blue", "middle"),
     ]
 
@@ -41,7 +47,7 @@ def across(x, y, width, words):
 def down(x, y, height, words):
     """A measure from y to y + height."""
     return [
-        f'  <path class="measure" d="M{number(x - 1)} {number(y)}h2M{number(x)} {number(y)}v{number(height)}m-1 0h2"/>',
+        path("measure", f"M{number(x - 1)} {number(y)}h2M{number(x)} {number(y)}v{number(height)}m-1 0h2"),
         text(x + 1.2, y + height / 2 + 0.8, words, "blue"),
     ]
 
@@ -49,7 +55,7 @@ def down(x, y, height, words):
 def ruler(x, y):
     ticks = "".join(f"M{number(x + mm)} {number(y)}v{-2 if mm % 10 == 0 else -1}" for mm in range(RULER_mm + 1))
     return [
-        f'  <path d="M{number(x)} {number(y)}h{RULER_mm}{ticks}"/>',
+        path("", f"M{number(x)} {number(y)}h{RULER_mm}{ticks}"),
         text(x, y + 3, f"{RULER_mm} mm: measure this line before you use the print"),
     ]
 

@@ -79,17 +79,12 @@ def label(row):
 def draw_lines(axes, trace, from_ns, to_ns, unit_ns, unit):
     names = trace.lines
     for i, name in enumerate(reversed(names)):
-        x, y, level = [from_ns], [], None
-        for t_ns, value in trace.levels[name]:
-            if t_ns <= from_ns or level is None:
-                level = value
-            elif t_ns < to_ns:
-                x += [t_ns, t_ns]
-                y += [level, value]
-                level = value
-        first = [value for t_ns, value in trace.levels[name] if t_ns <= from_ns][-1]
-        y, x = [first, *y, level], [*x, to_ns]
-        axes.plot([(t - from_ns) / unit_ns for t in x], [1.4 * i + v for v in y], color=ORANGE if name == "SCL" else BLUE, lw=0.8)
+        changes = [change for change in trace.levels[name] if change[0] < to_ns]
+        first = sum(t_ns <= from_ns for t_ns, _ in changes) - 1
+        times_ns = [from_ns, *(t_ns for t_ns, _ in changes[first + 1 :]), to_ns]
+        levels = [1.4 * i + level for _, level in [*changes[first:], changes[-1]]]
+        colour = ORANGE if name == "SCL" else BLUE
+        axes.plot([(t_ns - from_ns) / unit_ns for t_ns in times_ns], levels, drawstyle="steps-post", color=colour, lw=0.8)
     axes.set_yticks([1.4 * i + 0.5 for i in range(len(names))], list(reversed(names)))
     axes.set(xlim=(0, (to_ns - from_ns) / unit_ns), xlabel=f"{unit} from {from_ns / 1e6:.2f} ms after power-on")
 

@@ -6,6 +6,7 @@ import math
 import geometry
 import pico
 import sheet
+from sheet import path, text
 
 SYNC = "the [sync pin](../../host_tools/README.md#a-clock-that-cameras-share), 3.3 V; leave it open if there is no camera"
 MUX_CHANNELS, MUX_ADDRESS = 8, 0x70  # of a TCA9548A; the address with A2, A1, A0 low
@@ -89,10 +90,6 @@ def gpio_cell(numbers):
     return f"{listed(f'GP{n}' for n in numbers)} (pin{'s' if len(pins) > 1 else ''} {listed(pins)})"
 
 
-def cells(rows):
-    return "\n".join(f"| {a} | {b} |" for a, b in rows)
-
-
 def levels(board, strip):
     """Of A2, A1, A0."""
     bits = board.mux_address(strip) - MUX_ADDRESS
@@ -124,7 +121,7 @@ def table(board):
         (f"3V3 OUT (pin {pico.pin('3V3')})", f"VDD of {all_parts} (sensors: pad {pads['VDD']}), pull-ups"),
         (f"GND (pins {listed(pico.grounds())})", f"GND of {all_parts} (sensors: pad {pads['GND']})"),
     ]
-    page = "| from | to |\n|---|---|\n" + cells(rows) + "\n"
+    page = "| from | to |\n|---|---|\n" + "".join(f"| {a} | {b} |\n" for a, b in rows)
     if board.bus == "parallel":
         return page
     page += "\n| strip | address of its TCA9548A | A2, A1, A0 | channels |\n|---|---|---|---|\n"
@@ -174,16 +171,8 @@ PULL_UP = '<g id="pullup"><path d="M0 0v-5" stroke="#333"/><rect class="part" x=
 ROW, SENSOR_WIDTH = 30, 86
 
 
-def text(x, y, words, kind="", end=False):
-    return f'  <text{f" class={chr(34)}{kind}{chr(34)}" if kind else ""} x="{x}" y="{y}"{" text-anchor=" + chr(34) + "end" + chr(34) if end else ""}>{words}</text>'
-
-
-def path(kind, d):
-    return f'  <path class="{kind}" d="{d}"/>'
-
-
 def node(x, y, kind="node"):
-    return f'  <circle class="{kind}" cx="{x}" cy="{y}" r="2.3"/>'
+    return sheet.circle(x, y, 4.6, kind)
 
 
 def sensor(x, y, k, part):
@@ -195,7 +184,7 @@ def sensor(x, y, k, part):
 
 def gpio(y, number, right, label=""):
     name = f"GP{number}"
-    return [text(right - 134, y + 4, f"{name}  {label}".strip()), text(right - 6, y + 4, f"pin {pico.pin(name)}", "small", end=True)]
+    return [text(right - 134, y + 4, f"{name}  {label}".strip()), text(right - 6, y + 4, f"pin {pico.pin(name)}", "small", "end")]
 
 
 def picture(board, width, height, lines):
@@ -304,7 +293,7 @@ def drawn_multiplexed(board):
         for channel, k in enumerate(board.sensors_of(strip)):
             y = top + 14 + pitch * channel
             lines += [
-                text(mux_x + mux_width - 6, y + 4, f"SD{channel} SC{channel}", "small", end=True),
+                text(mux_x + mux_width - 6, y + 4, f"SD{channel} SC{channel}", "small", "end"),
                 path("wire", f"M{mux_x + mux_width} {y - 3}H{at_sensor}"),
                 path("scl", f"M{mux_x + mux_width} {y + 3}H{at_sensor}"),
                 *sensor(at_sensor, y, k, board.pad.part),

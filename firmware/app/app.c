@@ -143,7 +143,7 @@ static void note_more(uint32_t *before, uint32_t now, enum crash_event event) {
 static void note_troubles(struct second *second, const struct scan *scan) {
   note_more(&second->timeouts, scan_read(&scan->counters.bus_timeouts), CRASH_EVENT_BUS);
   note_more(&second->skipped, scan_read(&scan->counters.frames_skipped), CRASH_EVENT_SKIPPED);
-  const sensor_map present = scan_read(&scan->present);
+  const sensor_map present = scan_read_map(&scan->present);
   if (present != second->present) {
     second->present = present;
     port_event(CRASH_EVENT_SENSORS, 0);

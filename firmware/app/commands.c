@@ -62,7 +62,7 @@ static enum ft_status tare(struct app *app, uint8_t force) {
   if (force > 1) {
     return FT_ERR_ARGUMENT;
   }
-  if (scan_read(&app->scan.admitted) == 0 || (app->found.conditioned.contact && !force)) {
+  if (scan_read_map(&app->scan.admitted) == 0 || (app->found.conditioned.contact && !force)) {
     return FT_ERR_BUSY;
   }
   condition_tare(&app->stages.condition.condition);

@@ -3,8 +3,10 @@
 
 #include <stdint.h>
 
-/* Sensors of one array. */
+/* Sensors of one array: 36 where the pad has more than 32, and on a host, which takes any pad. */
+#ifndef FT_MAX_SENSORS
 #define FT_MAX_SENSORS 32
+#endif
 
 /* Stack of the main loop and the interrupts of a board's image, in bytes: what is reserved, and what any scene may use
  * at most. The checks of the images prove both by the call graph (tests/checks). */
@@ -20,7 +22,11 @@
 #define FT_APART_MAX_Pa 20000
 
 /* A map of sensors: bit k is sensor k. */
+#if FT_MAX_SENSORS > 32
+typedef uint64_t sensor_map;
+#else
 typedef uint32_t sensor_map;
+#endif
 
 static inline sensor_map sensor_bit(unsigned sensor) { return (sensor_map)1 << sensor; }
 

@@ -148,14 +148,14 @@ static NOINLINE void orthogonalise(struct moments *m) {
   m->y.square_norm = sum_of_squares(m->y.square, ROWS);
 }
 
-/* <e, readings>, Q26. */
+/* <e, readings>, Q(26 - PRODUCT_SHIFT). */
 static NOINLINE int32_t project_on_model(const struct moments *m, const int32_t *p_q14) {
   const int32_t *x = m->x.g_q14, *y = m->y.g_q14;
   int32_t product = 0;
   UNROLL for (int i = 0; i < COLUMNS; i++) {
     int32_t sum = 0;
     UNROLL for (int j = 0; j < ROWS; j++) { sum = fixed_plus(sum, fixed_times(p_q14[i * ROWS + j], y[j])); }
-    product = fixed_plus(product, fixed_mul_16(sum, x[i]));
+    product = fixed_plus(product, fixed_mul_16(sum, x[i]) >> PRODUCT_SHIFT);
   }
   return product;
 }
@@ -202,12 +202,12 @@ static NOINLINE void project(struct moments *m, const int32_t *values, int32_t s
   }
   int32_t b0 = 0, b1 = 0, b3_x = 0;
   UNROLL for (int i = 0; i < COLUMNS; i++) {
-    b0 += fixed_mul_16(over_y[i], x->g_q14[i]);
+    b0 += fixed_mul_16(over_y[i], x->g_q14[i]) >> PRODUCT_SHIFT;
     b1 += fixed_mul_16(over_y[i], x->linear[i]);
     b3_x += fixed_mul_16(over_y[i], x->square[i]);
   }
   int32_t q = shift - 26; /* values Q(28 - shift), g Q14, 16 bits dropped */
-  system->b0 = b0 >> 2;
+  system->b0 = b0 >> (2 - PRODUCT_SHIFT);
   system->b1 = (struct scaled){b1, q - x->linear_q};
   system->b2 = (struct scaled){b2, q - y->linear_q};
   system->b3 = (struct scaled){(b3_x >> 1) + (b3_y >> 1), q + 1 - m->square_q}; /* one bit more */
@@ -220,13 +220,13 @@ FIXED_INLINE void evaluate(struct readings *readings, bool coarse, struct moment
   set_gaussian(&m->x, COLUMNS, COLUMNS / 2, at->x, at->height);
   set_gaussian(&m->y, ROWS, ROWS / 2, at->y, at->height);
   orthogonalise(m);
-  int32_t mass_q14 = fixed_mul_q32(m->x.mass_q26, m->y.mass_q26) >> 6;
+  int32_t mass = fixed_mul_q32(m->x.mass_q26, m->y.mass_q26) >> (6 + PRODUCT_SHIFT);
   if (coarse) {
     project(m, readings->q14, 14, system);
-    system->amplitude_q28 = fit_grid_amplitude(system->b0 * 4, mass_q14, false);
+    system->amplitude_q28 = fit_grid_amplitude(system->b0 * (4 >> PRODUCT_SHIFT), mass, false);
   } else {
     int32_t product = project_on_model(m, readings->q14);
-    system->amplitude_q28 = fit_grid_amplitude(product, mass_q14, true);
+    system->amplitude_q28 = fit_grid_amplitude(product, mass, true);
     system->residual_shift = set_residual(m, system->amplitude_q28, readings);
     project(m, readings->residual, system->residual_shift, system);
   }

@@ -64,7 +64,7 @@ struct columns {
   int32_t skew_x, skew_y;      /* p3 = dx^2 + dy^2 - variance - skew_x dx - skew_y dy */
   int32_t variance;
   int32_t mass;                 /* sum of (e - d)^2, Q(30 - MASS_SHIFT) */
-  int32_t product_q26;          /* sum of e - d times the reading */
+  int32_t product;              /* sum of e - d times the reading, Q(26 - PRODUCT_SHIFT) */
   int32_t norm1, norm2, norm3;  /* value = integer * 2^(NORM_SHIFT - 2 q) */
   int32_t f21, f31, f32;        /* L of L D L^T, Q12 in the units of the columns */
   struct node node[MOST_NODES]; /* last: what is before is within reach of a short instruction */
@@ -182,7 +182,7 @@ FIXED_INLINE int32_t remaining(int32_t norm, int32_t taken) {
 /* Mean and variance of the positions under the squared model, and the readings times the model. */
 static NOINLINE void set_mean(const struct readings *readings, struct columns *c) {
   const int32_t *p_q14 = readings->q14;
-  int32_t product_q26 = 0;
+  int32_t product = 0;
   int32_t mass = 0, first_x = 0, first_y = 0, second = 0;
   const struct node *node = c->node;
   for (int i = 0; i < COLUMNS; i++) {
@@ -195,7 +195,7 @@ static NOINLINE void set_mean(const struct readings *readings, struct columns *c
       sum += weight;
       first_y += y * weight;
       second += y * y * (weight >> 2);
-      product_q26 += (*p_q14++ * node->mantissa) >> (node->shift + 3);
+      product += (*p_q14++ * node->mantissa) >> (node->shift + 3 + PRODUCT_SHIFT);
       node++;
     }
     mass += sum;
@@ -205,7 +205,7 @@ static NOINLINE void set_mean(const struct readings *readings, struct columns *c
   int32_t mean_x = fixed_div_q26(first_x, mass), mean_y = fixed_div_q26(first_y, mass);
   int32_t squares = fixed_mul_q26(mean_x, mean_x) + fixed_mul_q26(mean_y, mean_y);
   c->mass = mass;
-  c->product_q26 = product_q26;
+  c->product = product;
   c->mean_x = mean_x >> (26 - LINEAR_Q);
   c->mean_y = mean_y >> (26 - LINEAR_Q);
   c->variance = (fixed_div_q26(second, mass >> 2) - squares) >> (26 - LINEAR_Q);
@@ -216,14 +216,14 @@ FIXED_INLINE int32_t model_q15(const struct node *node) { return (node->mantissa
 
 /* Mass and product with the dip. */
 static NOINLINE void set_mass(const struct readings *readings, struct columns *c) {
-  int32_t mass = 1 << 13, product_q26 = 0; /* never 0 as a divisor, as the norms */
+  int32_t mass = 1 << 13, product = 0; /* never 0 as a divisor, as the norms */
   for (int k = 0; k < NODES; k++) {
     int32_t f = model_q15(&c->node[k]);
     mass += (f * f) >> MASS_SHIFT;
-    product_q26 += (readings->q14[k] * f) >> 3;
+    product += (readings->q14[k] * f) >> (3 + PRODUCT_SHIFT);
   }
   c->mass = mass;
-  c->product_q26 = product_q26;
+  c->product = product;
 }
 
 /* What one column moves, a change of centre and width, moves the dip with the centre alone, in the
@@ -606,7 +606,7 @@ static NOINLINE void evaluate(const struct readings *readings, enum accuracy acc
   set_dip(readings, system, c);
   fill_columns(readings, &rounding_ridge, c);
   orthogonalise(c);
-  system->amplitude_q28 = fit_grid_amplitude(c->product_q26, c->mass >> (16 - MASS_SHIFT), accuracy != COARSE);
+  system->amplitude_q28 = fit_grid_amplitude(c->product, c->mass >> (16 + PRODUCT_SHIFT - MASS_SHIFT), accuracy != COARSE);
   int32_t sum1 = 0, sum2 = 0, sum3 = 0;
   struct node *node = c->node;
   if (accuracy == COARSE) {

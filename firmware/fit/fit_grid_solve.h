@@ -35,10 +35,10 @@ struct fit_system {
 #define AMPLITUDE_MIN_Q28 13421773        /* 0.05 */
 #define AMPLITUDE_MAX_Q28 ((1 << 30) - 1) /* 4 */
 
-/* numerator (Q26) / denominator, limited to the two above, to 12 or 24 bits after the point. */
-FIXED_INLINE int32_t fit_grid_amplitude(int32_t numerator_q26, int32_t denominator_q14, bool fine) {
-  denominator_q14 = denominator_q14 < 1 ? 1 : denominator_q14;
-  int32_t quotient_q12 = port_divide(numerator_q26, denominator_q14);
+/* numerator (Q(26 - PRODUCT_SHIFT)) / denominator (Q(14 - PRODUCT_SHIFT)), limited to the two above, to 12 or 24 bits after the point. */
+FIXED_INLINE int32_t fit_grid_amplitude(int32_t numerator, int32_t denominator, bool fine) {
+  denominator = denominator < 1 ? 1 : denominator;
+  int32_t quotient_q12 = port_divide(numerator, denominator);
   if (quotient_q12 >= AMPLITUDE_MAX_Q28 >> 16) {
     return AMPLITUDE_MAX_Q28;
   }
@@ -47,8 +47,8 @@ FIXED_INLINE int32_t fit_grid_amplitude(int32_t numerator_q26, int32_t denominat
   }
   int32_t amplitude = quotient_q12 * (1 << 16);
   if (fine) {
-    int32_t rest = numerator_q26 - quotient_q12 * denominator_q14;
-    amplitude += port_divide(rest * (1 << 12), denominator_q14) * (1 << 4);
+    int32_t rest = numerator - quotient_q12 * denominator;
+    amplitude += port_divide(rest * (1 << 12), denominator) * (1 << 4);
   }
   return amplitude;
 }

@@ -33,6 +33,12 @@
 
 static void set(_Atomic uint32_t *to, uint32_t value) { atomic_store_explicit(to, value, memory_order_relaxed); }
 
+static void set_map(struct scan_map *to, sensor_map value) {
+  for (unsigned i = 0; i < sizeof to->words / sizeof to->words[0]; i++) {
+    set(&to->words[i], (uint32_t)(value >> (32 * i)));
+  }
+}
+
 static void count(_Atomic uint32_t *counter, uint32_t amount) { set(counter, scan_read(counter) + amount); }
 
 /* An interrupt and what it interrupts share one core: the compiler alone must keep the order. */
@@ -95,18 +101,18 @@ static void convert(struct scan *scan, bool is_temperature, bool is_frame) {
 }
 
 static void begin_bring_up(struct scan *scan, uint64_t now_us) {
-  const sensor_map admitted = scan_read(&scan->admitted);
-  const sensor_map suspects = scan_read(&scan->suspects) & admitted;
-  set(&scan->admitted, admitted & ~suspects);
+  const sensor_map admitted = scan_read_map(&scan->admitted);
+  const sensor_map suspects = scan_read_map(&scan->suspects) & admitted;
+  set_map(&scan->admitted, admitted & ~suspects);
   bring_up_begin(&scan->bring_up, suspects != 0, now_us);
   enter(scan, SCAN_RESET);
 }
 
 static void end_bring_up(struct scan *scan) {
   const struct bring_up_result result = bring_up_end(&scan->bring_up);
-  scan->returned |= result.admitted & ~scan_read(&scan->admitted);
-  set(&scan->admitted, result.admitted);
-  set(&scan->prom_bad, result.bad);
+  scan->returned |= result.admitted & ~scan_read_map(&scan->admitted);
+  set_map(&scan->admitted, result.admitted);
+  set_map(&scan->prom_bad, result.bad);
   set(&scan->temperature_within_us, 0); /* the next conversion is one */
   scan->void_next = 0;
   scan->was_zero = 0;
@@ -131,7 +137,7 @@ static bool is_near(uint32_t code, uint32_t last) { return code - last + TORN_TO
 static sensor_map judge_answers(struct scan *scan, sensor_map heard, sensor_map zero) {
   const bool single = scan->bus->answers_are_single;
   const sensor_map acknowledged = scan->result.acknowledged & first_sensors(scan->sensor_count);
-  sensor_map admitted = scan_read(&scan->admitted);
+  sensor_map admitted = scan_read_map(&scan->admitted);
   const sensor_map answered = admitted & acknowledged & heard;
   const sensor_map missed = admitted & ~answered;
   const sensor_map unusable = answered & (zero | scan->void_next);
@@ -145,8 +151,8 @@ static sensor_map judge_answers(struct scan *scan, sensor_map heard, sensor_map 
   scan->void_next = single ? 0 : zero | (missed & ~acknowledged);
   scan->wants_admission = (acknowledged & ~admitted) != 0 || admitted == 0 || bring_up_wants_recheck(&scan->bring_up);
   count(&scan->counters.zero_readings, count_sensors(unusable));
-  set(&scan->present, acknowledged);
-  set(&scan->admitted, admitted);
+  set_map(&scan->present, acknowledged);
+  set_map(&scan->admitted, admitted);
   return answered & ~unusable;
 }
 
@@ -204,7 +210,7 @@ static void take_reading(struct scan *scan, const struct scan_conversion *conver
     }
   }
   if (conversion->is_temperature) {
-    if (!slot || good != scan_read(&scan->admitted)) {
+    if (!slot || good != scan_read_map(&scan->admitted)) {
       scan->next_temperature_us = conversion->t_begin_us + TEMPERATURE_RETRY_us;
     }
   }
@@ -265,7 +271,7 @@ static void leave_idle(struct scan *scan, uint64_t now_us) {
   }
   /* A temperature that was read just now still has to go into its slot. */
   bool prom_is_free = !temperature_waits(scan) && !scan->last_was_temperature;
-  const bool wants_admission = scan->wants_admission || (scan_read(&scan->suspects) & scan_read(&scan->admitted)) != 0;
+  const bool wants_admission = scan->wants_admission || (scan_read_map(&scan->suspects) & scan_read_map(&scan->admitted)) != 0;
   if (wants_admission && now_us >= scan->bring_up.next_us && prom_is_free) {
     begin_bring_up(scan, now_us);
     return;
@@ -311,9 +317,9 @@ static enum ft_status start_operation(struct scan *scan, uint64_t now_us) {
 }
 
 static void fail_operation(struct scan *scan, enum ft_status why, uint64_t now_us) {
-  set(&scan->present, 0);
+  set_map(&scan->present, 0);
   if (why == FT_ERR_STUCK) {
-    set(&scan->admitted, 0);
+    set_map(&scan->admitted, 0);
     scan->bus_stuck = true;
     wait_in(scan, SCAN_WAIT_RECOVERY, now_us + scan->recovery_delay_us);
     scan->recovery_delay_us *= 2;
@@ -475,8 +481,8 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
       .good = slot->good,
       .prom_changed = slot->prom_changed,
       .returned = slot->returned,
-      .prom_bad = scan_read(&scan->prom_bad),
-      .admitted = scan_read(&scan->admitted),
+      .prom_bad = scan_read_map(&scan->prom_bad),
+      .admitted = scan_read_map(&scan->admitted),
       .is_late = apart_us > TEMPERATURE_LATE_us,
       .is_soon = TEMPERATURE_INTERVAL_us > apart_us,
       .is_patient = scan->bring_up.interval_us > 1000000u,
@@ -499,7 +505,7 @@ static void fill_head(struct scan *scan, const struct scan_conversion *conversio
 
 /* What scan_step is to know. Before a slot is given back: no admission begins while a temperature waits, and none is asked for twice. */
 static void report(struct scan *scan) {
-  set(&scan->suspects, scan->readings.suspects);
+  set_map(&scan->suspects, scan->readings.suspects);
   set(&scan->counters.implausible_readings, scan->readings.left_out);
 }
 

@@ -49,8 +49,21 @@ struct scan_settings {
 #define SCAN_TEMPERATURE_INTERVAL_ms 500u
 #define SCAN_TEMPERATURE_INTERVAL_MAX_ms 2000u
 
-/* A counter or map that the event context writes. */
+/* A counter that the event context writes. */
 static inline uint32_t scan_read(const _Atomic uint32_t *value) { return atomic_load_explicit(value, memory_order_relaxed); }
+
+/* A map that one context writes and any reads. A read may come between its words: each bit counts for itself. */
+struct scan_map {
+  _Atomic uint32_t words[(FT_MAX_SENSORS + 31) / 32];
+};
+
+static inline sensor_map scan_read_map(const struct scan_map *map) {
+  sensor_map value = 0;
+  for (unsigned i = 0; i < sizeof map->words / sizeof map->words[0]; i++) {
+    value |= (sensor_map)scan_read(&map->words[i]) << (32 * i);
+  }
+  return value;
+}
 
 /* Since start, modulo 2^32. Readable from any context. */
 struct scan_counters {
@@ -113,7 +126,7 @@ struct scan {
   _Atomic uint32_t temperature_interval_us; /* set by the main context */
   _Atomic uint32_t temperature_within_us;   /* if not 0, the next in less. Set while the slot of
                                                the temperature is claimed, reset while it is empty */
-  _Atomic sensor_map suspects;              /* bitmap: to be reset. Set by the main context */
+  struct scan_map suspects;                 /* bitmap: to be reset. Set by the main context */
   _Atomic uint32_t must_rest;
 
   /* Event context only. */
@@ -137,10 +150,10 @@ struct scan {
   sensor_map returned;     /* bitmap: admitted, and was not before */
 
   /* Written by the event context, readable from any. */
-  _Atomic sensor_map present;  /* bitmap: acknowledged at the last attempt */
-  _Atomic sensor_map admitted; /* bitmap */
-  _Atomic uint32_t rests;      /* as it must: nothing is under way on the bus */
-  _Atomic sensor_map prom_bad; /* bitmap: after all attempts its CRC differs, or it is blank */
+  struct scan_map present;  /* bitmap: acknowledged at the last attempt */
+  struct scan_map admitted; /* bitmap */
+  _Atomic uint32_t rests;   /* as it must: nothing is under way on the bus */
+  struct scan_map prom_bad; /* bitmap: after all attempts its CRC differs, or it is blank */
   struct scan_counters counters;
 
   /* Written by the event context while the slot of its kind is not claimed, read by the main

@@ -65,7 +65,7 @@ enum {
   STORE_LONG_SLOT_BYTES = 1024,
   STORE_SENSORS_OF_SHORT_SLOT = 18,                               /* with more it is long */
   STORE_SLOTS = PORT_FLASH_SECTOR_BYTES / STORE_SHORT_SLOT_BYTES, /* at most */
-  STORE_RECORD_BYTES = 700,                                       /* with the mark before it, without those behind it */
+  STORE_RECORD_BYTES = FT_MAX_SENSORS > 32 ? 760 : 700,           /* with the mark before it, without those behind it */
 };
 
 enum store_step {

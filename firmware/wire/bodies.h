@@ -13,7 +13,10 @@
 
 #define WIRE_VERSION 9
 
-enum { WIRE_TEXT_BYTES = 16, WIRE_MAX_BODY_BYTES = 1017 };
+/* Of a packet of more sensors, or whose maps have one beyond these: they are of 64 bits there, and this is added to its version. */
+enum { WIRE_SENSORS_OF_WORD = 32, WIRE_WIDE = 128 };
+
+enum { WIRE_TEXT_BYTES = 16, WIRE_MAX_BODY_BYTES = FT_MAX_SENSORS > 32 ? 1105 : 1017 };
 
 enum wire_type {
   /* device to host */
@@ -136,7 +139,7 @@ struct wire_contact {
   uint32_t flags; /* flags of the frame, see below */
   struct wire_stages stages;
   /* FIT_VALID */
-  uint32_t sensors_used; /* bitmap of the sensors that entered the fit */
+  sensor_map sensors_used; /* bitmap of the sensors that entered the fit */
   float x_mm; /* location across the strips, from the centre of the pad */
   float y_mm; /* location along the strips */
   float p0_Pa; /* peak of the fitted Gaussian */
@@ -194,13 +197,13 @@ struct wire_raw {
   uint32_t flags;
   /* bitmap: the reading is a measurement; 0 in a held frame, whose readings are those of the
    * frame before */
-  uint32_t valid;
+  sensor_map valid;
   /* bitmap: the reading is above 1980 mbar, where the sensor's range ends, and does not enter
    * the fit */
-  uint32_t saturated;
-  uint32_t doubtful; /* bitmap: a measurement with a reason to doubt it; 0 in a held frame */
+  sensor_map saturated;
+  sensor_map doubtful; /* bitmap: a measurement with a reason to doubt it; 0 in a held frame */
   int16_t temperature_cC; /* mean of the sensors, 0.01 degC; 0 until measured */
-  uint8_t sensor_count; /* number of sensors, 1 to 32 */
+  uint8_t sensor_count; /* number of sensors, 1 to 36 */
   /* of each sensor: absolute pressure, and the zero, of which the fit subtracts what has not
    * faded in this contact; both in 1/1024 Pa */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS];
@@ -211,7 +214,7 @@ struct wire_raw {
  * or NaN in Python). */
 struct wire_info {
   uint8_t firmware_version[3]; /* major, minor, patch */
-  uint8_t sensor_count; /* number of sensors, 1 to 32 */
+  uint8_t sensor_count; /* number of sensors, 1 to 36 */
   uint32_t capabilities; /* what the firmware can do, see below */
   char git_hash[WIRE_TEXT_BYTES]; /* commit of the firmware; a final + means uncommitted changes */
   char board[WIRE_TEXT_BYTES]; /* name of the board */
@@ -268,10 +271,10 @@ struct wire_health {
   uint32_t zero_readings;
   /* readings left out: below zero, or a step that no other sensor shared */
   uint32_t implausible_readings;
-  uint32_t sensors_present; /* bitmap: the sensor answered at the last attempt */
+  sensor_map sensors_present; /* bitmap: the sensor answered at the last attempt */
   /* bitmap: the PROM's CRC is wrong, and the sensor still streams; or the PROM is blank, and it
    * does not */
-  uint32_t sensors_prom_bad;
+  sensor_map sensors_prom_bad;
   /* since power-on. Faults and panics end in one too. The command crash asks for the last */
   uint32_t watchdog_resets;
   uint16_t cpu_busy_permille; /* main loop without interrupts, over the last second */

@@ -21,12 +21,14 @@ import tomllib
 from line_names import MADE_BY, SETS, hpp_head
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "n": 1}
+BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "map": 8, "n": 1}
+SENSORS_OF_WORD = 32  # of more a map has 64 bits
 C_TYPES = {
     "u8": "uint8_t",
     "u16": "uint16_t",
     "i16": "int16_t",
     "u32": "uint32_t",
+    "map": "sensor_map",
     "i32": "int32_t",
     "u64": "uint64_t",
     "f32": "float",
@@ -118,7 +120,7 @@ class Line:
     def warnings(self):
         return sum(1 << flag["bit"] for flag in self.flags if flag.get("warning"))
 
-    def longest_body(self):
+    def longest_body(self, sensors):
         """Bytes, with all that a body can hold."""
 
         def size(fields):
@@ -127,7 +129,7 @@ class Line:
                 if field.is_struct
                 else self.text_bytes
                 if field.kind == "text"
-                else BYTES[field.kind] * field.times * (field.per_sensor * self.sensors_max or 1)
+                else BYTES[field.kind] * field.times * (field.per_sensor * sensors or 1)
                 for field in fields
             )
 
@@ -135,7 +137,7 @@ class Line:
 
     def longest_frame(self):
         """Bytes, delimiter included: with header, CRC, and COBS's byte for each 254."""
-        packet = 12 + self.longest_body() + 4
+        packet = 12 + self.longest_body(self.sensors_max) + 4
         return packet + packet // 254 + 2
 
     def quantities(self):
@@ -273,7 +275,11 @@ def bodies_h(line):
         "",
         f"#define WIRE_VERSION {line.version}",
         "",
-        f"enum {{ WIRE_TEXT_BYTES = {line.text_bytes}, WIRE_MAX_BODY_BYTES = {line.longest_body()} }};",
+        "/* Of a packet of more sensors, or whose maps have one beyond these: they are of 64 bits there, and this is added to its version. */",
+        f"enum {{ WIRE_SENSORS_OF_WORD = {SENSORS_OF_WORD}, WIRE_WIDE = 128 }};",
+        "",
+        f"enum {{ WIRE_TEXT_BYTES = {line.text_bytes}, WIRE_MAX_BODY_BYTES = FT_MAX_SENSORS > {SENSORS_OF_WORD} ? "
+        f"{line.longest_body(line.sensors_max)} : {line.longest_body(SENSORS_OF_WORD)} }};",
         "",
         "enum wire_type {",
         "  /* device to host */",
@@ -330,29 +336,46 @@ def bodies_h(line):
     return lines
 
 
-KINDS = {"u8": "BYTES", "text": "TEXTS", "n": "SENSOR_COUNT", "u16": "U16", "i16": "U16", "u32": "U32", "u64": "U64", "f32": "F32"}
+KINDS = {
+    "u8": "BYTES",
+    "text": "TEXTS",
+    "n": "SENSOR_COUNT",
+    "u16": "U16",
+    "i16": "U16",
+    "u32": "U32",
+    "u64": "U64",
+    "f32": "F32",
+    "map": "MAP",
+}
 
 
-def runs_of(body, line, when=None, prefix=""):
-    """(kind, count, member, when), consecutive fields of one kind together."""
+def runs_of(body, line, wide, when=None, prefix=""):
+    """(kind, count, member, when), consecutive fields of one kind together. wide: maps may have 64 bits."""
     runs = []
     for field in body.fields:
         condition = field.when or when
         member = prefix + field.member
         if field.is_struct:
-            runs += runs_of(line.structs[field.kind], line, condition, member + ".")
+            runs += runs_of(line.structs[field.kind], line, wide, condition, member + ".")
             continue
         if field.pair:
             run = ("F32_PAIRS" if field.kind == "f32" else "PAIRS", 1, prefix + field.pair[0], condition)
         elif field.each:
             run = (f"SENSORS_{KINDS[field.kind]}", field.per_sensor, f"{member}[0].{field.each[0]}", condition)
         else:
-            run = (KINDS[field.kind], field.times, member, condition)
+            run = (KINDS["u32" if field.kind == "map" and not wide else field.kind], field.times, member, condition)
         if runs and runs[-1][0] == run[0] and runs[-1][3] == condition and run[0] in ("BYTES", "TEXTS", "U16", "U32", "F32"):
             runs[-1] = (run[0], runs[-1][1] + run[1], *runs[-1][2:])
         else:
             runs.append(run)
     return runs
+
+
+def run_lines(body, line, where, wide):
+    for kind, count, member, when in runs_of(body, line, wide):
+        if when:
+            yield f"    RUN(WHEN, {line.bit(when)}, {where}.{when[0]}),"
+        yield f"    RUN({kind}, {count}, {where}.{member}),"
 
 
 def layouts_inc(line):
@@ -361,7 +384,7 @@ def layouts_inc(line):
         " *",
         " * The layouts of all bodies, for packet.c alone. */",
         "",
-        f'_Static_assert(FT_MAX_SENSORS == {line.sensors_max}, "sensors_max of line.toml, of which WIRE_MAX_BODY_BYTES is made");',
+        f'_Static_assert(FT_MAX_SENSORS == {SENSORS_OF_WORD} || FT_MAX_SENSORS == {line.sensors_max}, "of which WIRE_MAX_BODY_BYTES is made");',
         "",
     ]
     for prefix, bodies in (("wire_", line.packets), ("cmd_", line.commands)):
@@ -373,10 +396,8 @@ def layouts_inc(line):
                 lines.append(f"EMPTY_LAYOUT({name}, {number});")
                 continue
             lines.append(f"static const struct run {name}_runs[] = {{")
-            for kind, count, member, when in runs_of(body, line):
-                if when:
-                    lines.append(f"    RUN(WHEN, {line.bit(when)}, {where}.{when[0]}),")
-                lines.append(f"    RUN({kind}, {count}, {where}.{member}),")
+            wide, narrow = (list(run_lines(body, line, where, each)) for each in (True, False))
+            lines += narrow if wide == narrow else ["#if FT_MAX_SENSORS > 32", *wide, "#else", *narrow, "#endif"]
             lines += ["};", f"LAYOUT({name}, {number});"]
     return [
         *lines,
@@ -455,7 +476,7 @@ def line_fields_hpp(line):
         '  visit("raw_sequence", packet.sequence);',
     ]
     for field in raw.fields:
-        if field.kind == "u32" and field.name != "frame":
+        if field.kind in ("u32", "map") and field.name != "frame":
             lines.append(f'  visit("{field.key}", raw.{field.name});')
         elif field.name == "temperature_cC":
             lines.append('  visit("temperature_degC", Scaled<std::int16_t>{raw.temperature_cC, 100.0, 2});')

@@ -5,7 +5,7 @@ import textwrap
 import line_settings
 from line_names import MADE_BY, SETS
 
-STRUCT_CODES = {"u8": "B", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "f32": "f", "n": "n", "text": "16s"}
+STRUCT_CODES = {"u8": "B", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "f32": "f", "map": "Q", "n": "n", "text": "16s"}
 
 
 def py_wire(field, line):
@@ -21,6 +21,7 @@ def py_wire(field, line):
         f'"{code}"'
         + (f", {field.times}" if field.times > 1 else "")
         + (f", {field.per_sensor}, each_sensor=True" if field.per_sensor else "")
+        + ", is_map=True" * (field.kind == "map")
     )
     if field.when:
         absent = "math.nan" if field.kind == "f32" else "0" if field.when[0] == "flags" else None
@@ -75,18 +76,22 @@ def line_py(line):
         "",
         f"VERSION = {line.version}",
         f"SENSORS_MAX = {line.sensors_max}",
+        "SENSORS_OF_WORD, ALL_OF_WORD = 32, (1 << 32) - 1",
+        "WIDE = 128",
+        '"""Of a version: the packet is of more sensors, or a map of it has one beyond these, so that its maps have 64 bits."""',
         f"MAX_FRAME_BYTES = {line.longest_frame()}  # longer is damage",
         f"LOADER_MAGIC = 0x{line.loader_magic:08X}",
         "",
         "",
         "class Wire(NamedTuple):",
-        '    """How a field travels: struct\'s code, how many of it, whether once for each sensor, and under which bit of which field."""',
+        '    """How a field travels: struct\'s code, how many of it, whether once for each sensor, under which bit of which field; of a map, that of a wide one."""',
         "",
         "    code: str",
         "    times: int = 1",
         "    each_sensor: bool = False",
         "    when: tuple[str, int] | None = None",
         "    absent: Any = None",
+        "    is_map: bool = False",
         "",
         "",
     ]
@@ -145,6 +150,7 @@ def line_py(line):
     lines += [
         "# Columns of recordings, and what their comments have of an info packet.",
         py_tuple("STAGES", line.stages()[:-1]),
+        py_tuple("MAPS", [field.key for body in (contact, raw) for field in body.fields if field.kind == "map"]),
         py_tuple("CONTACT_COLUMNS", contact.columns),
         *(
             py_tuple(f"{name}_COLUMNS", [field.name for field in fields], "NaN in recordings of before there were any")
@@ -153,7 +159,11 @@ def line_py(line):
         "LATER_COLUMNS = (" + ", ".join(f"*{name}_COLUMNS" for name in line.later()) + ")",
         py_tuple(
             "RAW_COLUMNS",
-            ["raw_sequence", *(field.key for field in raw.fields if field.kind == "u32" and field.name != "frame"), "temperature_degC"],
+            [
+                "raw_sequence",
+                *(field.key for field in raw.fields if field.kind in ("u32", "map") and field.name != "frame"),
+                "temperature_degC",
+            ],
         ),
         py_tuple("INFO_KEYS", [line.packets["info"].field(name).python for name in line.packets["info"].keys]),
         "# Of a calibration, one value for each sensor, and struct's code of it.",
@@ -189,7 +199,7 @@ def py_arrays(line):
     contact, raw = line.packets["contact"], line.packets["raw"]
     lines = ["class BlockQuantities:", '    """The quantities of both packets by their names, an array each."""', ""]
     for field in (*contact.fields, *raw.fields):
-        if (field.kind == "f32" or field.kind.startswith("u")) and field.name not in ("frame", "flags"):
+        if (field.kind in ("f32", "map") or field.kind.startswith("u")) and field.name not in ("frame", "flags"):
             lines.append(f'    {field.name}: "npt.NDArray[np.{"float64" if field.kind == "f32" else "int64"}]"')
     return lines
 

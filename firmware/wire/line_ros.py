@@ -2,7 +2,7 @@
 
 from line_names import MADE_BY
 
-ROS_TYPES = {"u16": "uint16", "u32": "uint32", "f32": "float32"}
+ROS_TYPES = {"u16": "uint16", "u32": "uint32", "map": "uint32", "f32": "float32"}
 
 
 def contact_msg(line):
@@ -40,10 +40,12 @@ def contact_msg(line):
         of(field) for fields in line.later().values() for field in fields
     ]
     lines += ["", described("bool has_raw", "without: all below is 0, NaN and empty"), "uint16 raw_sequence"]
-    lines += [of(field) for field in raw.fields if field.kind == "u32" and field.name != "frame"]
+    maps = [field.key for body in (contact, raw) for field in body.fields if field.kind == "map"]
+    lines += [of(field) for field in raw.fields if field.kind in ("u32", "map") and field.name != "frame"]
     return [
         *lines,
         described("float64 temperature_degc", "mean of the sensors; 0 until measured"),
         described("float64[] pressure_pa", "absolute, as measured; exact multiples of 1/1024"),
         described("float64[] tare_pa", "the zero of each sensor"),
+        described("uint32[] beyond", f"{', '.join(maps)}: their bits from 32 on; empty where there are none"),
     ]

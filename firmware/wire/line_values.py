@@ -4,7 +4,7 @@ import dataclasses
 
 from line_names import hpp_head
 
-BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "text": 1}
+BYTES = {"u8": 1, "u16": 2, "i16": 2, "u32": 4, "i32": 4, "u64": 8, "f32": 4, "map": 8, "text": 1}
 
 
 @dataclasses.dataclass
@@ -51,11 +51,9 @@ def values_of(body, line, where, part=""):
 
 
 def all_values(line):
-    """(body, its values) of each packet and command; the header is not among them."""
-    return [
-        *((body, values_of(body, line, f"body.{body.name}")) for body in line.packets.values()),
-        *((body, values_of(body, line, f"body.cmd_{body.name}")) for body in line.commands.values()),
-    ]
+    """(name in C, body, its values) of each packet and command; the header is not among them."""
+    bodies = [*((body.name, body) for body in line.packets.values()), *((f"cmd_{body.name}", body) for body in line.commands.values())]
+    return [(name, body, values_of(body, line, f"body.{name}")) for name, body in bodies]
 
 
 def line_values_hpp(line):
@@ -71,8 +69,7 @@ def line_values_hpp(line):
         "};",
         "",
     ]
-    for body, values in all_values(line):
-        where = body.name if body in line.packets.values() else f"cmd_{body.name}"
+    for where, _, values in all_values(line):
         lines.append(f"inline constexpr Field {where}_fields[] = {{")
         lines += [
             '    {"sequence", Kind::u16, offsetof(wire_packet, sequence), 1, 2},',
@@ -80,8 +77,8 @@ def line_values_hpp(line):
         ]
         for value in values:
             count = "FT_MAX_SENSORS" if value.per_sensor else value.count
-            stride = value.stride or BYTES[value.kind]
-            lines.append(f'    {{"{value.name}", Kind::{value.kind}, offsetof(wire_packet, {value.member}), {count}, {stride}}},')
+            stride, kind = value.stride or BYTES[value.kind], "u64" if value.kind == "map" else value.kind
+            lines.append(f'    {{"{value.name}", Kind::{kind}, offsetof(wire_packet, {value.member}), {count}, {stride}}},')
         lines += ["};"]
     lines += [
         "",
@@ -93,8 +90,7 @@ def line_values_hpp(line):
         "",
         "inline constexpr Packet packets[] = {",
     ]
-    for body, _ in all_values(line):
-        where = body.name if body in line.packets.values() else f"cmd_{body.name}"
+    for where, body, _ in all_values(line):
         lines.append(f"    {{0x{body.type:02X}, {where}_fields, sizeof {where}_fields / sizeof *{where}_fields}},")
     return [*lines, "};", "", "} // namespace fingertip::values"]
 
@@ -116,7 +112,7 @@ def page_packets(line):
         "}",
     ]
     commands = []
-    for body, values in all_values(line):
+    for _, body, values in all_values(line):
         if body in line.commands.values():
             commands.append(
                 " ".join(

@@ -22,7 +22,10 @@ enum kind {
   SENSORS_F32,
   SENSORS_U16,
   WHEN, /* no field: the next run is there if bit `count` of this word is set */
+  MAP,  /* U64 in a wide packet, else the lower half of one, U32 */
 };
+/* Of its version byte, where this build knows it. */
+#define WIDE (FT_MAX_SENSORS > WIRE_SENSORS_OF_WORD ? (unsigned)WIRE_WIDE : 0u)
 struct run {
   uint8_t kind;
   uint8_t count;
@@ -226,15 +229,29 @@ struct repeat {
   uint8_t times;
 };
 
-static inline struct repeat repeat_of(const struct run *run, uint8_t sensor_count) {
+static inline struct repeat repeat_of(const struct run *run, uint8_t sensor_count, unsigned wide) {
+  if (WIDE != 0 && run->kind == MAP) {
+    return (struct repeat){wide ? U64 : U32, 1, 1};
+  }
   if (run->kind >= SENSORS_F32) {
     return (struct repeat){run->kind == SENSORS_F32 ? F32 : U16, run->count, sensor_count};
   }
   return (struct repeat){run->kind, run->kind >= PAIRS ? sensor_count : run->count, 1};
 }
 
+/* WIRE_WIDE, if a sensor is beyond those of a word; else 0. */
+static unsigned width_of(const struct wire_layout *layout, const uint8_t *packet) {
+  bool wide = false;
+  for (const struct run *run = layout->runs; WIDE != 0 && run < layout->runs + layout->run_count; run++) {
+    sensor_map map = 0;
+    memcpy(&map, packet + run->offset, run->kind == MAP ? sizeof map : 0);
+    wide |= map > UINT32_MAX || (run->kind == SENSOR_COUNT && packet[run->offset] > WIRE_SENSORS_OF_WORD);
+  }
+  return wide ? WIDE : 0;
+}
+
 /* False: a value is refused. */
-static bool put_body(const struct wire_layout *layout, const uint8_t *packet, struct writer *writer) {
+static bool put_body(const struct wire_layout *layout, const uint8_t *packet, unsigned wide, struct writer *writer) {
   uint8_t sensor_count = 0;
   const struct run *end = layout->runs + layout->run_count;
   for (const struct run *run = layout->runs; run < end; run++) {
@@ -249,7 +266,7 @@ static bool put_body(const struct wire_layout *layout, const uint8_t *packet, st
         return false;
       }
     }
-    struct repeat repeat = repeat_of(run, sensor_count);
+    struct repeat repeat = repeat_of(run, sensor_count, wide);
     for (; repeat.times > 0; repeat.times--, field += sizeof(struct sensor_calibration)) {
       if (!put_run(writer, repeat.kind, field, repeat.count)) {
         return false;
@@ -263,7 +280,7 @@ static const uint8_t bytes_of_kind[] = {
     [BYTES] = 1, [TEXTS] = WIRE_TEXT_BYTES, [SENSOR_COUNT] = 1, [U16] = 2, [U32] = 4, [U64] = 8, [F32] = 4, [PAIRS] = 8, [F32_PAIRS] = 8};
 
 /* False: a value is refused, or the body has another length. */
-static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t length, uint8_t *packet) {
+static bool get_body(const struct wire_layout *layout, unsigned wide, const uint8_t *at, size_t length, uint8_t *packet) {
   uint8_t sensor_count = 0;
   const struct run *end = layout->runs + layout->run_count;
   for (const struct run *run = layout->runs; run < end; run++) {
@@ -272,7 +289,7 @@ static bool get_body(const struct wire_layout *layout, const uint8_t *at, size_t
       run += is_left_out(run, field);
       continue;
     }
-    struct repeat repeat = repeat_of(run, sensor_count);
+    struct repeat repeat = repeat_of(run, sensor_count, wide);
     size_t bytes = repeat.count * bytes_of_kind[repeat.kind];
     for (; repeat.times > 0; repeat.times--, field += sizeof(struct sensor_calibration)) {
       if (length < bytes || !get_run(at, repeat.kind, field, repeat.count)) {
@@ -297,11 +314,12 @@ enum ft_status wire_encode(const struct wire_layout *layout, const struct wire_p
     return FT_ERR_ARGUMENT;
   }
   struct writer writer = {.at = frame + 1, .crc = CRC32_BEGIN};
-  const uint8_t head[2] = {WIRE_VERSION, layout->type};
+  const unsigned wide = width_of(layout, (const uint8_t *)packet);
+  const uint8_t head[2] = {(uint8_t)(WIRE_VERSION | wide), layout->type};
   put_bytes(&writer, head, sizeof head);
   put_u16(&writer, (const uint8_t *)&packet->sequence, 1);
   put_u64(&writer, packet->t_us);
-  if (!put_body(layout, (const uint8_t *)packet, &writer)) {
+  if (!put_body(layout, (const uint8_t *)packet, wide, &writer)) {
     return FT_ERR_ARGUMENT;
   }
   bytes_put_u32(writer.at, ~writer.crc);
@@ -318,7 +336,8 @@ enum ft_status wire_decode(const struct wire_layout *const *set, uint8_t *frame,
   if (crc32_iso_hdlc(frame, used) != bytes_get_u32(frame + used)) {
     return FT_ERR_CRC;
   }
-  if (frame[0] != WIRE_VERSION) {
+  const unsigned wide = frame[0] & WIDE;
+  if (frame[0] != (WIRE_VERSION | wide)) {
     return FT_ERR_VERSION;
   }
   struct wire_packet decoded;
@@ -331,7 +350,7 @@ enum ft_status wire_decode(const struct wire_layout *const *set, uint8_t *frame,
     *packet = decoded;
     return FT_ERR_TYPE;
   }
-  if (!get_body(layout, frame + WIRE_HEADER_BYTES, used - WIRE_HEADER_BYTES, (uint8_t *)&decoded)) {
+  if (!get_body(layout, wide, frame + WIRE_HEADER_BYTES, used - WIRE_HEADER_BYTES, (uint8_t *)&decoded)) {
     return FT_ERR_FORMAT;
   }
   *packet = decoded;

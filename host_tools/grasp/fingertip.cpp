@@ -38,8 +38,7 @@ void check_for_grasp(const std::string &name, const wire_info &info, const wire_
   if ((info.capabilities & WIRE_CAPABILITY_FIT) == 0) {
     throw Error(name + ": firmware of scene " + text_field(info.scene) + " reports no force; flash scene grasp");
   }
-  const std::uint32_t all = info.sensor_count < 32 ? (1u << info.sensor_count) - 1 : ~0u;
-  if ((health.sensors_present & all) == 0) {
+  if ((health.sensors_present & first_sensors(info.sensor_count)) == 0) {
     throw Error(name + ": none of its sensors answers; see their wiring and supply (fingertip info)");
   }
 }

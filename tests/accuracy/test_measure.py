@@ -17,7 +17,7 @@ from measure import Measure, MeasureError, q10, stream_of, usable_of  # noqa: E4
 MEASURE = Measure(sys.argv.pop())
 X_mm, Y_mm, PITCH_mm = MEASURE.layout()
 ARRAY = MEASURE.array()
-ALL = np.uint32((1 << 15) - 1)
+ALL = np.uint64((1 << 15) - 1)
 
 
 def presses(count, seed=1, noise_Pa=5.0):
@@ -33,12 +33,12 @@ class Fit(unittest.TestCase):
         _, _, readings_Pa = presses(200)
         readings = q10(readings_Pa)
         settings = MEASURE.settings(200, noise_Pa=np.linspace(2, 20, 200))
-        for usable in (None, np.full(200, ALL & ~np.uint32(1 << 7), np.uint32)):
+        for usable in (None, np.full(200, ALL & ~np.uint64(1 << 7), np.uint64)):
             batch = MEASURE.fit(ARRAY, settings, readings, usable)
             direct = MEASURE.made("fit_result", 200)
             for i in range(200):
                 pointers = [ctypes.c_void_p(one.ctypes.data) for one in (ARRAY, readings[i], settings[i : i + 1], direct[i : i + 1])]
-                MEASURE.library.fit_gaussian(*pointers[:2], ctypes.c_uint32(ALL if usable is None else usable[i]), *pointers[2:])
+                MEASURE.library.fit_gaussian(*pointers[:2], ctypes.c_uint64(int(ALL if usable is None else usable[i])), *pointers[2:])
             self.assertEqual(batch.tobytes(), direct.tobytes())
 
     def test_presses_are_found_where_they_are(self):
@@ -60,18 +60,18 @@ class Fit(unittest.TestCase):
             (dict(pressure_Pa_q10=readings[0]), "another number of dimensions"),
             (dict(pressure_Pa_q10=readings[:, :14].copy()), "another number of sensors"),
             (dict(pressure_Pa_q10=readings[:, ::-1]), "neither a number, a text nor an array in C order"),
-            (dict(usable=np.zeros(3, np.uint32)), "arrays of different lengths"),
+            (dict(usable=np.zeros(3, np.uint64)), "arrays of different lengths"),
             (dict(settings=MEASURE.settings(3)), "neither one row nor one for each"),
             (dict(kernel="none"), "no kernel has the name none"),
         ):
             with self.assertRaisesRegex(MeasureError, words):
                 MEASURE.fit(
-                    **({"array": ARRAY, "settings": settings, "pressure_Pa_q10": readings, "usable": np.full(4, ALL, np.uint32)} | values)
+                    **({"array": ARRAY, "settings": settings, "pressure_Pa_q10": readings, "usable": np.full(4, ALL, np.uint64)} | values)
                 )
         fixed = MEASURE.made("fit_result", 4)
         fixed.flags.writeable = False
         with self.assertRaisesRegex(MeasureError, "argument 8: an array that is written"):
-            MEASURE.call("fit", "fit", 2, ARRAY, settings, MEASURE.no_own, readings, np.full(4, ALL, np.uint32), fixed, np.zeros(1))
+            MEASURE.call("fit", "fit", 2, ARRAY, settings, MEASURE.no_own, readings, np.full(4, ALL, np.uint64), fixed, np.zeros(1))
         with self.assertRaisesRegex(MeasureError, "fit: another number of arguments"):
             MEASURE.call("fit", "fit")
         with self.assertRaisesRegex(MeasureError, "no such entry point"):
@@ -109,7 +109,7 @@ class Frames(unittest.TestCase):
         pressed_Pa = np.where(np.arange(400) % 100 > 60, 1.0, 0.0)[:, None] * presses(1)[2]
         frames["pressure_Pa_q10"][0, :, :15] = q10(101325.0 + pressed_Pa)
         chained, *_ = MEASURE.chain(ARRAY, MEASURE.settings(), frames)
-        flags, usable, above = np.zeros(400, np.uint8), np.zeros(400, np.uint32), np.zeros((400, 15), np.int32)
+        flags, usable, above = np.zeros(400, np.uint8), np.zeros(400, np.uint64), np.zeros((400, 15), np.int32)
         readings = np.ascontiguousarray(frames["pressure_Pa_q10"][0, :, :15])
         MEASURE.call("gate_series", 5.0, frames["t_us"][0].copy(), readings, flags, usable, above, np.zeros(0, np.int32))
         np.testing.assert_array_equal(flags & 1, chained["contact"][0])
@@ -153,7 +153,7 @@ class Calibration(unittest.TestCase):
         touches["force_N"], touches["x_mm"], touches["y_mm"] = 3.0, random.uniform(-8, 8), random.uniform(-16, 16)
         readings_Pa = gain * MEASURE.base_pressure("sphere15", 12.0, touches) + 0.5 * random.normal(15)
         readings_Pa[0, 3] = np.nan
-        self.assertEqual(usable_of(readings_Pa)[0], ALL & ~np.uint32(8))
+        self.assertEqual(usable_of(readings_Pa)[0], ALL & ~np.uint64(8))
         found, sensors, own = MEASURE.calibrate(X_mm, Y_mm, PITCH_mm, 8.0 * np.arange(24.0)[None], readings_Pa[None], 0.5)
         self.assertEqual((int(found["state"][0]), found["reason"][0]), (1, b"none"))
         self.assertLess(abs(sensors["gain"][0] - gain / gain.mean()).max(), 0.06)

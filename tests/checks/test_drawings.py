@@ -109,7 +109,7 @@ class Wiring(unittest.TestCase):
             ("multiplexed", "sensors_of_strip", 4, "15 sensors do not make whole strips"),
             ("parallel", "sensors_of_strip", 0, "a strip has 1 to 15"),
             ("parallel", "sensor_address", "0x40", "have the address 0x76 or 0x77"),
-            ("parallel", "sensor_count", "", "1 to 32 sensors are read"),
+            ("parallel", "sensor_count", "", "1 to 36 sensors are read"),
             ("parallel", "pin_scl", 14, "SCL is above the data lines"),
             ("parallel", "pin_sync", 15, "GPIO 15 is pin_scl already"),
         ):

@@ -116,8 +116,8 @@ class Generator(unittest.TestCase):
 
     def test_the_longest_frame_is_that_of_the_longest_body(self):
         described = line.Line(ROOT / "firmware/wire/line.toml")
-        # Info of 32 sensors, calibrated, with a pad; as PROTOCOL.md says.
-        self.assertEqual(described.longest_frame(), 12 + (136 + 22 * 32 + 177) + 4 + 4 + 2)
+        # Info of 36 sensors, calibrated, with a pad; as PROTOCOL.md says.
+        self.assertEqual(described.longest_frame(), 12 + (136 + 22 * 36 + 177) + 4 + 4 + 2)
         self.assertIn(f"longer than {described.longest_frame()} bytes is damage", (ROOT / PAGE).read_text(encoding="utf-8"))
 
     def test_what_is_there_twice_is_refused(self):
@@ -129,7 +129,7 @@ class Generator(unittest.TestCase):
         for before, after in (
             ("protocol, version 9", "protocol, version 8"),
             ("| version, 9 |", "| version, 8 |"),
-            ("longer than 1039 bytes", "longer than 1038 bytes"),
+            ("longer than 1127 bytes", "longer than 1126 bytes"),
         ):
             self.run_it()
             self.change(PAGE, before, after)

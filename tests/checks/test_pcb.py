@@ -40,10 +40,6 @@ def exchanged(a, b):
     return lambda text: text.replace(f'"{a}"', '"@"').replace(f'"{b}"', f'"{a}"').replace('"@"', f'"{b}"')
 
 
-def pads_at(place):
-    return lambda text: re.sub(r"(\(pad .*?\(at )(-?[\d.]+) (-?[\d.]+)", lambda at: f"{at[1]}{place(float(at[2]), float(at[3]))}", text)
-
-
 def replaced(old, new, count=1):
     return lambda text: re.sub(old, new, text, count=count)
 
@@ -54,7 +50,7 @@ def added(line):
 
 TRACK = '(segment (start %s) (end %s) (width %g) (layer "%s.Cu") (net %d))'
 VIA = '(via (at 101.9 101.9) (size 0.6) (drill %g) (layers "F.Cu" "B.Cu") (net 2))'
-MIRRORED = pads_at(lambda x, y: f"{-x:g} {y:g}")
+MIRRORED = lambda text: re.sub(r"(\(pad .*?\(at )(-?[\d.]+)", lambda at: f"{at[1]}{-float(at[2]):g}", text)
 NETS_AND_PLACES = {
     "parallel": {
         "a sensor moved by 2 um": part("U3", moved(0, 0.002)),

@@ -17,7 +17,9 @@ using nlohmann::json;
 struct Numbers {
   json &to;
   template <typename Value> void operator()(const std::string &name, const Value &value) { to[name] = value; }
-  void operator()(const std::string &name, std::uint64_t value) { to[name] = std::to_string(value); }
+  void operator()(const std::string &name, std::uint64_t value) {
+    to[name] = name == "host_time_us" ? json(std::to_string(value)) : json(value);
+  }
 };
 
 static json packet_json(const wire_packet &packet) {

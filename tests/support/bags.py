@@ -28,6 +28,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
 from fingertip import RecordingWriter, wire  # noqa: E402
 from fingertip.errors import InputError  # noqa: E402
+from fingertip.line import ALL_OF_WORD, MAPS, SENSORS_MAX  # noqa: E402
 from fingertip.mcap_recording import McapLines  # noqa: E402
 from mcap.exceptions import McapError  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
@@ -85,8 +86,8 @@ def some_packets(seed, frames):
         flags = prng.choice((TARED, 0, CONTACT | TARED, some, trusted, TRUSTED | CONTACT | TARED | TANGENTIAL))
         values = {}
         for name, field in wire.layout_of(wire.Contact):
-            there = not field.when or flags & field.when[1]
-            values[name] = (number() if field.code == "f" else prng.getrandbits(8 * struct.calcsize(field.code))) if there else field.absent
+            there, bits = not field.when or flags & field.when[1], SENSORS_MAX if field.is_map else 8 * struct.calcsize(field.code)
+            values[name] = (number() if field.code == "f" else prng.getrandbits(bits)) if there else field.absent
         contact = wire.Contact(**{**values, "frame": frame, "flags": flags})
         readings = tuple(prng.randrange(-(2**31), 2**31) for _ in range(30))
         raw = wire.Raw(
@@ -190,6 +191,9 @@ def expected_contacts(csv_path):
             )
         for name, kind in (("pressure_pa", "s"), ("tare_pa", "tare")):
             message[name] = [round(float(cell[f"{kind}{k}_Pa"]) * 1024) / 1024 for k in range(sensors)] if has_raw else []
+        maps = {name: message[name] for name in MAPS}
+        message |= {name: each & ALL_OF_WORD for name, each in maps.items()}
+        message["beyond"] = [each >> 32 for each in maps.values()] if max(maps.values()) > ALL_OF_WORD else []
         rows[number] = message
     return rows
 

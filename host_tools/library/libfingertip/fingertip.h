@@ -50,8 +50,8 @@ const char *fingertip_error(void);
 
 enum {
   FINGERTIP_PROTOCOL = 9,      /* version of the line's protocol */
-  FINGERTIP_SENSORS_MOST = 32, /* of one fingertip */
-  FINGERTIP_FRAME_MOST = 1039, /* bytes of a packet on the line, its final zero included */
+  FINGERTIP_SENSORS_MOST = 36, /* of one fingertip */
+  FINGERTIP_FRAME_MOST = 1127, /* bytes of a packet on the line, its final zero included */
   FINGERTIP_VALUES_MOST = 416, /* at least as many as the longest packet has numbers */
   FINGERTIP_TEXT_LENGTH = 16
 };

@@ -22,7 +22,8 @@ public:
   /* packet: header and body. */
   explicit Envelope(Bytes packet) : packet_(std::move(packet)) {}
 
-  std::uint8_t version() const { return packet_[0]; }
+  /* Without what a wide packet adds. */
+  std::uint8_t version() const { return packet_[0] & (WIRE_WIDE - 1); }
   std::uint8_t type() const { return packet_[1]; }
   std::uint16_t sequence() const;
   void set_sequence(std::uint16_t sequence);

@@ -56,9 +56,9 @@ Metadata info_metadata(const wire_info &info) {
   return pairs;
 }
 
-std::vector<std::pair<std::string, std::uint32_t>> health_fields(const wire_health &health) {
-  std::vector<std::pair<std::string, std::uint32_t>> fields;
-  auto visit = [&](const std::string &name, std::uint32_t value) { fields.emplace_back(name, value); };
+std::vector<std::pair<std::string, std::uint64_t>> health_fields(const wire_health &health) {
+  std::vector<std::pair<std::string, std::uint64_t>> fields;
+  auto visit = [&](const std::string &name, std::uint64_t value) { fields.emplace_back(name, value); };
   wire_health copy = health;
   visit_health(visit, copy);
   return fields;

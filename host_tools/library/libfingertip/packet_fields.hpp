@@ -34,7 +34,7 @@ inline bool sends_both(const wire_info &info) {
 Metadata info_metadata(const wire_info &info);
 
 /* The counters of a health packet. */
-std::vector<std::pair<std::string, std::uint32_t>> health_fields(const wire_health &health);
+std::vector<std::pair<std::string, std::uint64_t>> health_fields(const wire_health &health);
 
 } // namespace fingertip
 #pragma GCC visibility pop

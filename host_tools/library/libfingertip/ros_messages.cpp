@@ -76,6 +76,7 @@ public:
   template <typename... Values> std::enable_if_t<(sizeof...(Values) > 1)> get(Values &...values) { (get(values), ...); }
 
   bool is_good() const { return good_; }
+  bool has(std::size_t bytes) const { return bytes_.size() - std::min(at_, bytes_.size()) >= bytes; }
 
 private:
   std::string_view bytes_;
@@ -131,10 +132,14 @@ std::string status(const Header &header, const std::string &name, const std::str
 /* The fields of a packet in their order, for visit_contact and visit_raw. */
 struct CdrPut {
   CdrWriter &writer;
-  bool is_there; /* the packet */
+  bool is_there;                      /* the packet */
+  std::vector<std::uint32_t> &beyond; /* of its maps, the bits beyond a word */
   template <typename Value> void operator()(const std::string &, const Value &value) {
     using Plain = std::decay_t<Value>;
-    if constexpr (std::is_same_v<Plain, Quantity>) {
+    if constexpr (std::is_same_v<Plain, sensor_map>) {
+      writer.put(static_cast<std::uint32_t>(value));
+      beyond.push_back(static_cast<std::uint32_t>(value >> WIRE_SENSORS_OF_WORD));
+    } else if constexpr (std::is_same_v<Plain, Quantity>) {
       writer.put(cell_text(value).empty() ? std::numeric_limits<float>::quiet_NaN() : value.value);
     } else if constexpr (std::is_integral_v<Plain>) {
       writer.put(value);
@@ -159,9 +164,15 @@ template <typename Integer> Integer scaled(double value, double scale) {
 struct CdrGet {
   CdrReader &reader;
   bool is_there; /* the packet */
+  std::vector<sensor_map *> &maps;
   template <typename Value> void operator()(const std::string &, Value &&value) {
     using Plain = std::decay_t<Value>;
-    if constexpr (std::is_same_v<Plain, Quantity>) {
+    if constexpr (std::is_same_v<Plain, sensor_map>) {
+      std::uint32_t word;
+      reader.get(word);
+      value = word;
+      maps.push_back(&value);
+    } else if constexpr (std::is_same_v<Plain, Quantity>) {
       reader.get(value.value);
       if (std::isnan(value.value)) {
         if (value.valid && is_there) {
@@ -322,7 +333,8 @@ std::string encode(const Header &header, const Row &row) {
   CdrWriter writer = begun(header);
   writer.put(row.number, row.device, row.time_us.value_or(NOT_A_NUMBER), row.contact ? row.contact->t_us : row.raw->t_us, frame_of(row));
   wire_packet contact = row.contact.value_or(wire_packet{}), raw = row.raw.value_or(wire_packet{});
-  CdrPut put_contact{writer, row.contact.has_value()}, put_raw{writer, row.raw.has_value()};
+  std::vector<std::uint32_t> beyond;
+  CdrPut put_contact{writer, row.contact.has_value(), beyond}, put_raw{writer, row.raw.has_value(), beyond};
   writer.put(put_contact.is_there);
   visit_contact(put_contact, contact);
   writer.put(put_raw.is_there);
@@ -333,6 +345,11 @@ std::string encode(const Header &header, const Row &row) {
       writer.put(readings[k] / Q10);
     }
   }
+  if (std::all_of(beyond.begin(), beyond.end(), [](std::uint32_t word) { return word == 0; })) {
+    beyond.clear();
+  }
+  writer.count(beyond.size());
+  std::for_each(beyond.begin(), beyond.end(), [&](std::uint32_t word) { writer.put(word); });
   return writer.bytes();
 }
 
@@ -348,10 +365,11 @@ std::optional<Row> decode_row(std::string_view bytes) {
   reader.get(row.number, row.device, time_us, t_us, frame);
   try {
     reader.get(has_contact);
-    CdrGet get_contact{reader, has_contact};
+    std::vector<sensor_map *> maps;
+    CdrGet get_contact{reader, has_contact, maps};
     visit_contact(get_contact, contact);
     reader.get(has_raw);
-    CdrGet get_raw{reader, has_raw};
+    CdrGet get_raw{reader, has_raw, maps};
     visit_raw(get_raw, raw, WITHOUT_SENSORS);
     std::uint32_t count = 0, pressures = 0;
     for (std::int32_t *readings : {raw.body.raw.pressure_Pa_q10, raw.body.raw.baseline_Pa_q10}) {
@@ -370,6 +388,18 @@ std::optional<Row> decode_row(std::string_view bytes) {
       return std::nullopt;
     }
     raw.body.raw.sensor_count = static_cast<std::uint8_t>(count);
+    count = 0;
+    if (reader.has(sizeof count)) { /* messages of before end without it */
+      reader.get(count);
+    }
+    for (std::size_t i = 0; count == maps.size() && i < count; i++) {
+      std::uint32_t word;
+      reader.get(word);
+      *maps[i] |= sensor_map{word} << WIRE_SENSORS_OF_WORD;
+    }
+    if (count != 0 && count != maps.size()) {
+      return std::nullopt;
+    }
   } catch (const NoPacket &) {
     return std::nullopt;
   }

@@ -85,7 +85,7 @@ public:
     fit_result fit;
     struct fit_tangential found;
     fit_tangential_state state{};
-    fit_gaussian_grid(&array_, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info_.sensor_count), &settings_, &fit);
+    fit_gaussian_grid(&array_, readings.data(), first_sensors(info_.sensor_count), &settings_, &fit);
     for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
       fit_tangential_estimate(&array_, &pad_, readings.data(), &settings_, &fit, &state, &found);
     }

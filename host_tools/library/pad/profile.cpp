@@ -66,7 +66,7 @@ double force_ratio(const pad_profile &profile, const wire_info &info) {
       pressures_Pa_q10[k] = static_cast<std::int32_t>(std::lround(1024 * FORCE_N * pressure_Pa(profile, dx * dx + dy * dy)));
     }
     fit_result fit;
-    fit_gaussian(&array, pressures_Pa_q10.data(), UINT32_MAX >> (FT_MAX_SENSORS - info.sensor_count), &settings, &fit);
+    fit_gaussian(&array, pressures_Pa_q10.data(), first_sensors(info.sensor_count), &settings, &fit);
     if (!(fit.flags & CONTACT_FLAG_FIT_VALID)) {
       throw Error(ErrorCode::bad_value, "the fingertip has too few sensors to fit a contact");
     }

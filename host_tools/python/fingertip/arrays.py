@@ -111,8 +111,8 @@ def round_half_away(value):
 
 def usable_of(readings):
     """Bitmap for each row of the sensors with a reading, [.., sensor] -> [..]."""
-    bits = np.uint32(1) << np.arange(readings.shape[-1], dtype=np.uint32)
-    return np.where(np.isnan(readings), np.uint32(0), bits).sum(axis=-1, dtype=np.uint32)
+    bits = np.uint64(1) << np.arange(readings.shape[-1], dtype=np.uint64)
+    return np.where(np.isnan(readings), np.uint64(0), bits).sum(axis=-1, dtype=np.uint64)
 
 
 class Firmware(Library):
@@ -164,7 +164,7 @@ class Firmware(Library):
         """(fit_result [press], microseconds of processor time for each)."""
         found, us = self.made("fit_result", len(pressure_Pa_q10)), np.zeros(1)
         if usable is None:
-            usable = np.full(len(found), (1 << pressure_Pa_q10.shape[1]) - 1, np.uint32)
+            usable = np.full(len(found), (1 << pressure_Pa_q10.shape[1]) - 1, np.uint64)
         self.call("fit", kernel, threads, array, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, found, us)
         return found, float(us[0])
 
@@ -182,7 +182,7 @@ class Firmware(Library):
     def usable(pressure_Pa_q10, usable=None):
         """Bitmaps [contact, frame] of readings [contact, frame, sensor]: all sensors, or those of [contact] or [contact, frame]."""
         every = (1 << pressure_Pa_q10.shape[2]) - 1 if usable is None else usable if usable.ndim == 2 else usable[:, None]
-        return np.ascontiguousarray(np.broadcast_to(every, pressure_Pa_q10.shape[:2]), np.uint32)
+        return np.ascontiguousarray(np.broadcast_to(every, pressure_Pa_q10.shape[:2]), np.uint64)
 
     def profile(self, thickness_mm, overhang_mm=0.0, from_touch=False, layout=None):
         """pad_profile [1] of a pad over these sensors (x_mm, y_mm, pitch_mm), or the firmware's own."""
@@ -199,7 +199,7 @@ class Firmware(Library):
         self.call("tangential_pad", array, profile, pad)
         shape = pressure_Pa_q10.shape[:2]
         usable = self.usable(pressure_Pa_q10, usable)
-        saturated = np.zeros(shape, np.uint32) if saturated is None else saturated
+        saturated = np.zeros(shape, np.uint64) if saturated is None else saturated
         found = self.made("fit_result", *shape), self.made("fit_tangential", *shape)
         self.call("tangential", array, pad, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, saturated, *found)
         return found

@@ -208,7 +208,7 @@ def inputs(
     noise_Pa: float,
     has_profile: bool = False,
     **fields: Any,
-) -> tuple[Any, Any, npt.NDArray[np.int32], npt.NDArray[np.uint32], Any]:
+) -> tuple[Any, Any, npt.NDArray[np.int32], npt.NDArray[np.uint64], Any]:
     """What the fit gets of readings: fit_array, fit_settings, readings in 1/1024 Pa, bitmap of the usable sensors, fit_own or None. fields: of
     fit_settings."""
     known = calibration or {}

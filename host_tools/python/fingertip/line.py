@@ -12,19 +12,23 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
 VERSION = 9
-SENSORS_MAX = 32
-MAX_FRAME_BYTES = 1039  # longer is damage
+SENSORS_MAX = 36
+SENSORS_OF_WORD, ALL_OF_WORD = 32, (1 << 32) - 1
+WIDE = 128
+"""Of a version: the packet is of more sensors, or a map of it has one beyond these, so that its maps have 64 bits."""
+MAX_FRAME_BYTES = 1127  # longer is damage
 LOADER_MAGIC = 0x746F6F42
 
 
 class Wire(NamedTuple):
-    """How a field travels: struct's code, how many of it, whether once for each sensor, and under which bit of which field."""
+    """How a field travels: struct's code, how many of it, whether once for each sensor, under which bit of which field; of a map, that of a wide one."""
 
     code: str
     times: int = 1
     each_sensor: bool = False
     when: tuple[str, int] | None = None
     absent: Any = None
+    is_map: bool = False
 
 
 class Flag(enum.IntFlag):
@@ -226,7 +230,7 @@ class Contact(NamedTuple):
     """slip, and the flags of the result"""
     total_us: Annotated[int, Wire("H")]
     """the sum of the six stages: from the first bus activity of the frame to the encoding of this packet"""
-    sensors_used: Annotated[int, Wire("I", when=("flags", Flag.FIT_VALID), absent=0)]
+    sensors_used: Annotated[int, Wire("Q", is_map=True, when=("flags", Flag.FIT_VALID), absent=0)]
     """bitmap of the sensors that entered the fit"""
     x_mm: Annotated[float, Wire("f", when=("flags", Flag.FIT_VALID), absent=math.nan)]
     """location across the strips, from the centre of the pad"""
@@ -307,16 +311,16 @@ class Raw(NamedTuple):
     """as in the contact packet; firmware without capability fit sets only CONTACT, TARED, HELD, SATURATED, SENSOR_MASKED, ZERO_DOUBTFUL and
     SENSOR_DOUBTFUL
     """
-    valid: Annotated[int, Wire("I")]
+    valid: Annotated[int, Wire("Q", is_map=True)]
     """bitmap: the reading is a measurement; 0 in a held frame, whose readings are those of the frame before"""
-    saturated: Annotated[int, Wire("I")]
+    saturated: Annotated[int, Wire("Q", is_map=True)]
     """bitmap: the reading is above 1980 mbar, where the sensor's range ends, and does not enter the fit"""
-    doubtful: Annotated[int, Wire("I")]
+    doubtful: Annotated[int, Wire("Q", is_map=True)]
     """bitmap: a measurement with a reason to doubt it; 0 in a held frame"""
     temperature_cC: Annotated[int, Wire("h")]
     """mean of the sensors, 0.01 degC; 0 until measured"""
     sensors: Annotated[int, Wire("n")]
-    """number of sensors, 1 to 32"""
+    """number of sensors, 1 to 36"""
     readings: Annotated[tuple[int, ...], Wire("i", 2, each_sensor=True)]
     """of each sensor: absolute pressure, and the zero, of which the fit subtracts what has not faded in this contact; both in 1/1024 Pa"""
 
@@ -327,7 +331,7 @@ class Info(NamedTuple):
     firmware: Annotated[tuple[int, ...], Wire("B", 3)]
     """major, minor, patch"""
     sensors: Annotated[int, Wire("n")]
-    """number of sensors, 1 to 32"""
+    """number of sensors, 1 to 36"""
     capabilities: Annotated[int, Wire("I")]
     """what the firmware can do, see below"""
     git: Annotated[str, Wire("16s")]
@@ -415,9 +419,9 @@ class Health(NamedTuple):
     """conversions that had not finished, and those that are void after one of these or after a missed reading"""
     implausible_readings: Annotated[int, Wire("I")]
     """readings left out: below zero, or a step that no other sensor shared"""
-    sensors_present: Annotated[int, Wire("I")]
+    sensors_present: Annotated[int, Wire("Q", is_map=True)]
     """bitmap: the sensor answered at the last attempt"""
-    sensors_prom_bad: Annotated[int, Wire("I")]
+    sensors_prom_bad: Annotated[int, Wire("Q", is_map=True)]
     """bitmap: the PROM's CRC is wrong, and the sensor still streams; or the PROM is blank, and it does not"""
     watchdog_resets: Annotated[int, Wire("I")]
     """since power-on. Faults and panics end in one too. The command crash asks for the last"""
@@ -703,6 +707,8 @@ class Settable:
 # Columns of recordings, and what their comments have of an info packet.
 STAGES = (
     "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us")
+MAPS = (
+    "sensors_used", "valid", "saturated", "doubtful")
 CONTACT_COLUMNS = (
     "sequence", "flags", "sensors_used", "x_mm", "y_mm", "p0_Pa", "sigma_mm", "force_N", "slip_mm", "residual_rms_Pa", "location_sd_mm",
     "force_sd_N", "sigma_x_mm", "sigma_y_mm", "width_correlation", "convert_us", "read_us", "queue_us", "condition_us", "fit_us", "contact_us",

@@ -12,7 +12,8 @@ def shortest(value: float) -> str:
     """The shortest text that reads back the same binary32; nothing for NaN."""
     if math.isnan(value):
         return ""
-    return str(np.float32(value)).removesuffix(".0")
+    text = str(np.float32(value)).removesuffix(".0")
+    return min(str(int(value)), text, key=len) if "e+" in text else text
 
 
 class LineFile:

@@ -23,7 +23,7 @@ import numpy as np
 from .columns import Array
 from .errors import InputError
 from .frames import Q10
-from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX
+from .line import CONTACT_COLUMNS, LATER_COLUMNS, MAPS, RAW_COLUMNS, SENSORS_MAX
 from .lines import LineFile, shortest
 from .messages import CONTACT_TYPE, DIAGNOSTICS_TYPE, FRAME_TOPICS, LINE_TYPE, PRESSURES_TYPE, TYPES, FrameMessages
 from .messages import diagnostics, health_status, name_in_ros, stamp
@@ -293,18 +293,19 @@ class Skipped:
 def _contact_layout(frame_id: int, sensors: int) -> np.dtype[Any]:
     """Of such a message behind its encapsulation, with a frame_id of this length and these sensors' pressures."""
     fields: list[Any] = [("sec", "<u4"), ("nanosec", "<u4"), ("frame_id_bytes", "<u4"), ("frame_id", f"S{frame_id}")]
-    for name, kind, is_sequence in fields_of(CONTACT_TYPE)[1:]:
+    *others, (beyond, _, _) = fields_of(CONTACT_TYPE)[1:]
+    for name, kind, is_sequence in others:
         code = "<" + PRIMITIVES[kind].replace("?", "B")
         fields += [(f"{name}_count", "<u4")] * is_sequence + [(name, code, (sensors,) if is_sequence else ())] * (
             not is_sequence or sensors > 0
         )
-    return np.dtype(fields, align=True)
+    return np.dtype([*fields, (f"{beyond}_count", "<u4"), (beyond, "<u4", (len(MAPS),))], align=True)
 
 
-def _length_of(layout: np.dtype[Any]) -> int:
-    """Without what aligns its end."""
+def _length_of(layout: np.dtype[Any], names: tuple[str, ...] = ("tare_pa", "tare_pa_count")) -> int:
+    """To the end of the first of these that it has, without what aligns that."""
     assert layout.fields
-    kind, at = layout.fields["tare_pa" if "tare_pa" in layout.fields else "tare_pa_count"][:2]
+    kind, at = layout.fields[next(name for name in names if name in layout.fields)][:2]
     return int(at + kind.itemsize)
 
 
@@ -637,6 +638,8 @@ class McapLineReader:
                 found["time_us"] = math.nan  # a recording of one
             table[at], fine[at] = rows.of_contacts(found, sensors)
             devices[at], times_us[at] = found["device"], np.round(found["time_us"], 1)
+            whole = length - 4 >= _length_of(layout, ("beyond",))
+            fine[at] &= (found["beyond_count"] == 0) | (whole & (found["beyond_count"] == len(MAPS)))
             fine[at] &= (frame_ids == frame_ids[0]) & (np.isnan(found["time_us"]) != bool(self._is_joint)) & ~np.isinf(found["time_us"])
         numbers = np.array(contacts.numbers, "Q")
         starts = np.flatnonzero(~fine | np.concatenate(([True], ~fine[:-1] | (numbers[1:] - numbers[:-1] != 1))))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .line import WARNINGS, Flag
+from .line import ALL_OF_WORD, MAPS, SENSORS_OF_WORD, WARNINGS, Flag
 from .ros_messages import CDR_LITTLE_ENDIAN, PRIMITIVES, encode, fields_of, packer_of
 
 CONTACT_TYPE, LINE_TYPE, WRENCH_TYPE, PLACE_TYPE, PRESSURES_TYPE, DIAGNOSTICS_TYPE = (
@@ -109,13 +109,17 @@ class FrameMessages:
 
     def of(self, time_ns: int, row: dict[str, Any], is_repeated: bool = True) -> Iterator[tuple[str, bytes]]:
         """(type, bytes) of a frame. row: fingertip_msgs/Contact without its header. is_repeated: other types than Contact have its numbers, too."""
-        head = (time_ns // 10**9, time_ns % 10**9, *self._text)
+        head, valid = (time_ns // 10**9, time_ns % 10**9, *self._text), row["valid"]
         pressures, tares = row["pressure_pa"], row["tare_pa"]
         packer = self._packers.get(len(pressures))
         if packer is None:
             lists = ("I", f"{len(pressures)}d") * 2
-            packer = self._packers[len(pressures)] = packer_of((*self._codes, *_CONTACT_CODES, *lists))
-        body = packer.pack(*head, *_contact_values(row), len(pressures), *pressures, len(tares), *tares)
+            packer = self._packers[len(pressures)] = packer_of((*self._codes, *_CONTACT_CODES, *lists, "I"))
+        beyond = [row[name] >> SENSORS_OF_WORD for name in MAPS]
+        if any(beyond):
+            row = row | {name: row[name] & ALL_OF_WORD for name in MAPS}
+        body = packer.pack(*head, *_contact_values(row), len(pressures), *pressures, len(tares), *tares, len(beyond) * any(beyond))
+        body += struct.pack(f"<{len(beyond)}I", *beyond) * any(beyond)
         yield CONTACT_TYPE, CDR_LITTLE_ENDIAN + body
         flags = row["flags"]
         if is_repeated and row["has_contact"]:
@@ -123,7 +127,6 @@ class FrameMessages:
             yield WRENCH_TYPE, CDR_LITTLE_ENDIAN + self._six.pack(*head, *_wrench(flags, x_mm, y_mm, *forces_N))
             yield PLACE_TYPE, CDR_LITTLE_ENDIAN + self._three.pack(*head, *_location(flags, x_mm, y_mm))
         if is_repeated and row["has_raw"] and self._cloud is not None and len(self._cloud) == len(pressures):
-            valid = row["valid"]
             self._cloud[:, 3] = [a - b if valid >> k & 1 else math.nan for k, (a, b) in enumerate(zip(pressures, tares))]
             yield PRESSURES_TYPE, CDR_LITTLE_ENDIAN + struct.pack("<iI", *head[:2]) + self._cloud_head + self._cloud.tobytes() + b"\0"
         if row["has_contact"] and self.warnings != flags & WARNINGS:

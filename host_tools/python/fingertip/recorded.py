@@ -12,7 +12,7 @@ from .cells import cells_of
 from .columns import Array
 from .frames import Q10
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS, SENSORS_MAX, SHAPE_COLUMNS, TANGENTIAL_COLUMNS
-from .line import Acknowledgement, Calibration, Contact, Health, Info, PadProfile, SyncEdge, Wire
+from .line import MAPS, SENSORS_OF_WORD, Acknowledgement, Calibration, Contact, Health, Info, PadProfile, SyncEdge, Wire
 from .wire import layout_of
 
 _LARGEST = {"B": 2**8 - 1, "n": 2**8 - 1, "h": 2**15 - 1, "H": 2**16 - 1, "I": 2**32 - 1, "Q": 2**64 - 1}
@@ -164,7 +164,7 @@ class Rows:
             raise ValueError("unknown header")
         wires = {"sequence": Wire("H"), **dict(layout_of(Contact))}
         contact = [wires[name] for name in self.names[2 : self._first_raw]]
-        self._codes = ["Q", "I", *(wire.code for wire in contact), "H", "I", "I", "I", "I", "h", *"i" * 2 * self.sensors]
+        self._codes = ["Q", "I", *(wire.code for wire in contact), "H", "I", *"Q" * 3, "h", *"i" * 2 * self.sensors]
         self.codes = dict(zip(self.names, self._codes))
         self._flags = {at: int(wire.when[1]) for at, wire in enumerate(contact, 2) if wire.code == "f" and wire.when}
         self._floats, self._bits = list(self._flags), np.array(list(self._flags.values()), np.uint32)
@@ -215,6 +215,8 @@ class Rows:
         table = np.full((len(found), len(self.names)), math.nan)
         for at in range(last - 1):
             table[:, at] = found[self.names[at].lower()]
+        for word, name in enumerate(MAPS):
+            table[:, self.names.index(name)] += found["beyond"][:, word] * 2.0**SENSORS_OF_WORD * (found["beyond_count"] > 0)
         floats = table[:, self._floats]
         wrong = np.isinf(floats) | (np.isnan(floats) & ((found["flags"][:, None] & self._bits) != 0))
         fine = (has_contact | has_raw) & ~(has_contact & (wrong.any(axis=1) | ((found["flags"] & self._untold) != 0)))

@@ -17,6 +17,7 @@ _CRC = _FLAGS = struct.Struct("<I")
 # CRC-32/ISO-HDLC over anything and its own CRC.
 _CRC_RESIDUE = 0x2144DF1C
 _LONGEST_RUN = 255
+_MAPS = {0: "I", WIDE: "Q"}  # struct's code of one, by what the version has
 _TYPE_OF: dict[type[Body], int] = {body: number for number, body in TYPES.items()}
 
 
@@ -50,7 +51,7 @@ def _is_left_out(wire: Wire, values: dict[str, Any]) -> bool:
 
 
 def _get(body: Any, data: bytes, at: int, sensors: int) -> tuple[Any, int]:
-    """A body that begins at this offset, and where it ends. Raises struct.error where the bytes end before."""
+    """A body that begins at this offset of a packet, and where it ends. Raises struct.error where the bytes end before."""
     values: dict[str, Any] = {}
     for name, wire in layout_of(body):
         if _is_left_out(wire, values):
@@ -64,7 +65,8 @@ def _get(body: Any, data: bytes, at: int, sensors: int) -> tuple[Any, int]:
             at += 1
         else:
             count = wire.times * (sensors if wire.each_sensor else 1)
-            form = f"<{wire.code}" if count == 1 and not wire.each_sensor else f"<{count}{wire.code}"
+            code = _MAPS[data[0] & WIDE] if wire.is_map else wire.code
+            form = f"<{code}" if count == 1 and not wire.each_sensor else f"<{count}{code}"
             found = struct.unpack_from(form, data, at)
             at += struct.calcsize(form)
             if wire.code == "f" and not all(map(math.isfinite, found)):
@@ -75,7 +77,14 @@ def _get(body: Any, data: bytes, at: int, sensors: int) -> tuple[Any, int]:
     return body(**values), at
 
 
-def _put(body: Any, sensors: int) -> bytes:
+def _is_wide(body: Any) -> bool:
+    most = {
+        name: ALL_OF_WORD if wire.is_map else SENSORS_OF_WORD for name, wire in layout_of(body.__class__) if wire.is_map or wire.code == "n"
+    }
+    return any(getattr(body, name) > number for name, number in most.items())
+
+
+def _put(body: Any, sensors: int, wide: int) -> bytes:
     data = b""
     values: dict[str, Any] = body._asdict()
     for name, wire in layout_of(body.__class__):
@@ -83,7 +92,7 @@ def _put(body: Any, sensors: int) -> bytes:
         if _is_left_out(wire, values):
             continue
         if wire.code in NESTED:
-            data += _put(value, sensors)
+            data += _put(value, sensors, wide)
             continue
         if wire.code == "n":
             if not 1 <= value <= SENSORS_MAX:
@@ -99,7 +108,7 @@ def _put(body: Any, sensors: int) -> bytes:
             if _text(items[0]) != value or len(items[0]) > 16:
                 raise FormatError(f'{name} is "{value}"')
         try:
-            data += struct.pack("<" + wire.code * len(items), *items)
+            data += struct.pack("<" + (_MAPS[wide] if wire.is_map else wire.code) * len(items), *items)
         except (struct.error, OverflowError, TypeError):
             raise FormatError(f"{name} is {value}") from None
         if wire.code == "f" and not all(map(math.isfinite, items)):
@@ -145,11 +154,12 @@ def cobs_decode(frame: bytes) -> bytearray:
 
 def encode(packet: Packet, version: int = VERSION) -> bytes:
     """The frame on the line, with its delimiter. Raises FormatError for a value that the protocol does not allow."""
+    wide = WIDE * _is_wide(packet.body)
     try:
-        head = _HEADER.pack(version, _TYPE_OF[type(packet.body)], packet.sequence, packet.t_us)
+        head = _HEADER.pack(version | wide, _TYPE_OF[type(packet.body)], packet.sequence, packet.t_us)
     except struct.error:
         raise FormatError(f"sequence {packet.sequence} or time {packet.t_us} us") from None
-    data = head + _put(packet.body, 0)
+    data = head + _put(packet.body, 0, wide)
     return cobs_encode(data + _CRC.pack(zlib.crc32(data))) + b"\0"
 
 
@@ -169,7 +179,7 @@ class _ContactLayouts(dict[int, _FixedLayout]):
 
     def __missing__(self, mask: int) -> _FixedLayout:
         there = [(name, wire) for name, wire in self.FIELDS if not wire.when or mask & wire.when[1]]
-        unpacker = struct.Struct("<BBHQ" + "".join(wire.code for _, wire in there))
+        unpacker = struct.Struct("<BBHQ" + "".join(_MAPS[0] if wire.is_map else wire.code for _, wire in there))
         places = {name: 4 + i for i, (name, _) in enumerate(there)}
         nan = 4 + len(there)
         order = [places.get(name, nan if wire.code == "f" else nan + 1) for name, wire in self.FIELDS]
@@ -205,16 +215,16 @@ def decode(frame: bytes) -> Packet:
     if zlib.crc32(data) != _CRC_RESIDUE:
         raise CrcError("the CRC is wrong")
     version, number, sequence, t_us = _HEADER.unpack_from(data)
-    if version != VERSION:
+    if version & ~WIDE != VERSION:
         raise PacketVersionError(version)
     # Of the packets of a stream all fields at once: in a few microseconds.
-    if number == CONTACT and length >= _FLAGS_AT + 4:
+    if number == CONTACT and version == VERSION and length >= _FLAGS_AT + 4:
         unpacker, order, floats = _contact_layouts[_FLAGS.unpack_from(data, _FLAGS_AT)[0] & _ContactLayouts.MASK]
         if unpacker.size == length:
             values = unpacker.unpack_from(data)
             if math.isfinite(sum(values[floats:])):  # or one of them is not: binary32 does not overflow in binary64
                 return _new(Packet, (sequence, t_us, _new(Contact, order(values + _ABSENT))))
-    if number == RAW and length > _SENSORS_AT and 1 <= data[_SENSORS_AT] <= SENSORS_MAX:
+    if number == RAW and version == VERSION and length > _SENSORS_AT and 1 <= data[_SENSORS_AT] <= SENSORS_MAX:
         unpacker = _raw_layouts[data[_SENSORS_AT]]
         if unpacker.size == length:
             values = unpacker.unpack_from(data)

@@ -24,7 +24,7 @@ MEASURE_RECORD(compared_fit, FIELD(x_mm), FIELD(y_mm), FIELD(p0_Pa), FIELD(sigma
 namespace {
 
 template <auto SOLVE>
-compared_fit alternative(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
+compared_fit alternative(const fit_array &array, const std::int32_t *pressure_Pa_q10, sensor_map usable,
                          const fitting::KernelSettings &settings) {
   const auto found = SOLVE(&array, pressure_Pa_q10, usable, settings.iterations);
   const bool valid = std::isfinite(found.x_mm) && std::isfinite(found.y_mm) && found.sigma_mm != 0.0;
@@ -49,7 +49,7 @@ constexpr Named OWN[] = {
 // kernel: of those above, or a library, which one thread at a time may call. us: of one fit, if a single thread runs them.
 static void compare(std::string kernel, std::int64_t threads, std::int64_t iterations, std::int64_t firmware_guess,
                     Batch<const fit_array, 1> array, Batch<const double, 1> noise_Pa, Batch<const std::int32_t, 2> pressure_Pa_q10,
-                    Batch<const std::uint32_t, 1> usable, Batch<compared_fit, 1> results, Batch<double, 1> us) {
+                    Batch<const sensor_map, 1> usable, Batch<compared_fit, 1> results, Batch<double, 1> us) {
   same_length(results, pressure_Pa_q10, usable, noise_Pa);
   require(array[0].sensor_count == pressure_Pa_q10.size(1), "readings of another number of sensors");
   fitting::Solve solve = fitting::library_named(kernel);
@@ -77,7 +77,7 @@ MEASURE_RECORD(reference_fit, FIELD(p0_Pa), FIELD(x_mm), FIELD(y_mm), FIELD(sigm
 // The optimum of presses [press][sensor]. starts [press or 0]: a further first guess. all_starts: Ceres from every
 // start. Without a positive usable reading there is none, and its location's sd is infinite.
 static void optimum(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm, Batch<const double, 2> pressure_Pa,
-                    Batch<const std::uint32_t, 1> usable, Batch<const double, 1> noise_Pa, Batch<const reference_fit, 1> starts,
+                    Batch<const sensor_map, 1> usable, Batch<const double, 1> noise_Pa, Batch<const reference_fit, 1> starts,
                     std::int64_t all_starts, Batch<reference_fit, 1> results) {
   same_length(results, pressure_Pa, usable, noise_Pa);
   require(starts.size() == 0 || starts.size() == results.size(), "another number of starts");

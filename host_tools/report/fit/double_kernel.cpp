@@ -47,7 +47,7 @@ double best_amplitude(const Samples &samples, const Gaussian &theta) {
 }
 
 // What the firmware's fit of these readings starts from.
-Gaussian firmware_guess(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable, const Samples &samples) {
+Gaussian firmware_guess(const fit_array &array, const std::int32_t *pressure_Pa_q10, sensor_map usable, const Samples &samples) {
   fit_settings none{};
   none.noise_Pa_q10 = 1;
   fit_result result;
@@ -61,7 +61,7 @@ Gaussian firmware_guess(const fit_array &array, const std::int32_t *pressure_Pa_
 
 } // namespace
 
-Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable) {
+Samples normalise(const fit_array &array, const std::int32_t *pressure_Pa_q10, sensor_map usable) {
   Samples samples;
   std::int32_t largest = 0;
   for (unsigned k = 0; k < array.sensor_count; k++) {
@@ -113,8 +113,7 @@ KernelResult in_units(const fit_array &array, const Samples &samples, const Gaus
   return {theta.x * pitch_mm, theta.y * pitch_mm, theta.p0 * samples.unit_Pa, theta.sigma * pitch_mm, CONTACT_FLAG_FIT_VALID};
 }
 
-KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable,
-                           const KernelSettings &settings) {
+KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10, sensor_map usable, const KernelSettings &settings) {
   const Samples samples = normalise(array, pressure_Pa_q10, usable);
   if (samples.count < 4) {
     return {};

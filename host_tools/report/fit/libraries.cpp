@@ -39,7 +39,7 @@ void evaluate(const Samples &samples, const double *theta, double *residual, dou
 using Minimise = void (*)(const Samples &samples, double theta[4]);
 
 template <Minimise MINIMISE>
-KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable, const KernelSettings &settings) {
+KernelResult with(const fit_array &array, const std::int32_t *pressure_Pa_q10, sensor_map usable, const KernelSettings &settings) {
   const Samples samples = normalise(array, pressure_Pa_q10, usable);
   if (samples.count != SENSORS) {
     return {};

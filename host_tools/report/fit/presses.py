@@ -27,7 +27,7 @@ GATE_NOISES = 20.0
 OUTSIDE_mm = 6.0
 LAYER_mm = {"C": 12.0, "D": 6.0}
 SENSORS = 15
-ALL = np.uint32((1 << SENSORS) - 1)
+ALL = np.uint64((1 << SENSORS) - 1)
 
 SHAPES = ("sphere6", "sphere15", "cylinder6", "cube6")
 MASK_STREAM = 1000
@@ -87,7 +87,7 @@ def redraw(measure, set_, random):
 def usable_sensors(measure, set_, mask, seed, readings):
     """Bitmap [press]"""
     if mask == "peak":
-        return ALL & ~(np.uint32(1) << readings.argmax(axis=1).astype(np.uint32))
+        return ALL & ~(np.uint64(1) << readings.argmax(axis=1).astype(np.uint64))
     random = measure.random(seed, MASK_STREAM + SETS.index(set_), np.arange(len(readings)))
     return random.some_of(SENSORS, SENSORS - {"none": 0, "random": 1, "random2": 2, "random3": 3}[mask])
 
@@ -137,7 +137,9 @@ def load(measure, compared, set_, mask, seed, count, cache):
         solve(compared, made, np.flatnonzero(missing), f"reference of set {set_}, mask {mask}")
         kept.parent.mkdir(parents=True, exist_ok=True)
         np.savez(kept, source=SOURCE, usable=made.usable, readings=made.readings, best=made.best)
-    largest = np.where(made.usable[:, None] >> np.arange(SENSORS, dtype=np.uint32) & 1, made.readings, np.iinfo(np.int32).min).max(axis=1)
+    largest = np.where(
+        made.usable[:, None] >> np.arange(SENSORS, dtype=np.uint64) & np.uint64(1), made.readings, np.iinfo(np.int32).min
+    ).max(axis=1)
     made.observable = made.best["observable"] & (largest >= GATE_NOISES * 1024 * made.noise_Pa)
     made.set = set_
     return made

@@ -75,7 +75,7 @@ def print_optima(measure, options):
     for start in range(0, len(rows), ROWS_AT_ONCE):
         some = rows[start : start + ROWS_AT_ONCE]
         readings_Pa = np.array([row.readings_Pa for row in some])
-        usable = np.where([row.fits for row in some], usable_of(readings_Pa), np.uint32(0)).astype(np.uint32)
+        usable = np.where([row.fits for row in some], usable_of(readings_Pa), np.uint64(0))
         best = compared.optimum(1024 * np.nan_to_num(readings_Pa), usable, [row.noise_Pa for row in some])
         for row, found in zip(some, best):
             print_row(row, found)

@@ -187,8 +187,7 @@ bool step(const Readings &p, bool last, State *state) {
 
 } // namespace
 
-KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10, std::uint32_t /*usable*/,
-                       const KernelSettings &settings) {
+KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10, sensor_map /*usable*/, const KernelSettings &settings) {
   const fit_grid_shape &grid = array.grid;
   if (grid.columns != COLUMNS || grid.rows != ROWS) {
     return {};

@@ -45,7 +45,7 @@ class Presses(SimpleNamespace):
     """One for each state of `random`: pressure_Pa [press, sensor] above the atmosphere, x_mm, y_mm; what a case does not change is as here."""
 
     located = True  # whether there is a location to find
-    dead = np.uint32(0)  # bitmap of sensors without a reading
+    dead = np.uint64(0)  # bitmap of sensors without a reading
     limited_range = True  # the sensor's; without it, scale is the only thing that grows
     prior_sigma_mm = 0.0  # of a prior with a standard deviation of 0.5 mm; 0: none
     gain_sd = 0.0  # as the firmware has it
@@ -134,7 +134,7 @@ def dead(alive, peak):
     def case(layout, random):
         made = inside()(layout, random)
         if peak:
-            return made.but(dead=np.uint32(1) << made.pressure_Pa.argmax(axis=1).astype(np.uint32))
+            return made.but(dead=np.uint64(1) << made.pressure_Pa.argmax(axis=1).astype(np.uint64))
         return made.but(dead=presses.ALL & ~random.some_of(presses.SENSORS, alive))
 
     return case
@@ -238,7 +238,7 @@ def frames_of(measure, pressure_Pa, made):
     """[press, 1]"""
     frames = measure.made("frame", len(pressure_Pa), 1)
     sensors = pressure_Pa.shape[1]
-    bits = np.uint32(1) << np.arange(sensors, dtype=np.uint32)
+    bits = np.uint64(1) << np.arange(sensors, dtype=np.uint64)
     alive = (np.broadcast_to(made.dead, len(pressure_Pa))[:, None] & bits) == 0
     absolute = np.where(alive, saturated_q10(ATMOSPHERE_Pa + pressure_Pa), 0)
     frames["sensor_count"], frames["noise_Pa_q10"][:, 0] = sensors, np.maximum(1, saturated_q10(made.noise_Pa))

@@ -157,7 +157,7 @@ class Contacts(Measure):
         """(published, found) of touches that hold still, on pads [touch]. A reading above the sensor's range is left out of the fit. found: every
         frame has a fit."""
         readings_Pa = self.readings_Pa(base_Pa, pads, noise_Pa, normals)
-        saturated = ((readings_Pa > self.max_pressure_Pa - AMBIENT_Pa) << np.arange(SENSORS)).sum(axis=2).astype(np.uint32)
+        saturated = ((readings_Pa > self.max_pressure_Pa - AMBIENT_Pa) << np.arange(SENSORS)).sum(axis=2).astype(np.uint64)
         settings, own = self.settings_of(pads, noise_Pa), self.own_of(pads)
         fits, estimates = self.tangential(self.own_array, profile, settings, q10(readings_Pa), usable, saturated, own=own)
         exact = profile.view(f"V{profile.itemsize}").copy().view(profile.dtype)  # with the pad's ends, which are no fields of the record

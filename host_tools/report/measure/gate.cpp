@@ -119,7 +119,7 @@ static void gate_begin(std::int64_t seed, double frames_per_s, std::int64_t nois
     std::copy(std::begin(part.prom), std::end(part.prom), std::begin(pad.prom[k].word));
   }
   pad.taken.sensor_count = SENSORS;
-  pad.taken.valid = (1u << SENSORS) - 1;
+  pad.taken.valid = first_sensors(SENSORS);
   pad.taken.noise_Pa_q10 = static_cast<std::int32_t>(noise_Pa_q10);
   condition_start(&pad.state);
 }
@@ -162,7 +162,7 @@ MEASURE_ENTRY(gate_run)
 // The firmware's condition of readings [frame][sensor], 1/1024 Pa. Of each frame: flags (enum Flag), bitmap of the
 // usable sensors, and pressure [frame][sensor] above the zero; and past_sd of the last frame.
 static void gate_series(double noise_Pa, Batch<const std::uint64_t, 1> t_us, Batch<const std::int32_t, 2> reading_Pa_q10,
-                        Batch<std::uint8_t, 1> flags, Batch<std::uint32_t, 1> usable, Batch<std::int32_t, 2> pressure_Pa_q10,
+                        Batch<std::uint8_t, 1> flags, Batch<sensor_map, 1> usable, Batch<std::int32_t, 2> pressure_Pa_q10,
                         Batch<std::int32_t, 1> past_sd_Pa_q10) {
   same_length(t_us, reading_Pa_q10, flags, usable, pressure_Pa_q10);
   const std::size_t sensors = reading_Pa_q10.size(1);
@@ -171,7 +171,7 @@ static void gate_series(double noise_Pa, Batch<const std::uint64_t, 1> t_us, Bat
   condition_start(&state);
   frame taken{};
   taken.sensor_count = static_cast<std::uint8_t>(sensors);
-  taken.valid = UINT32_MAX >> (32 - sensors);
+  taken.valid = first_sensors(static_cast<unsigned>(sensors));
   taken.noise_Pa_q10 = static_cast<std::int32_t>(1024.0 * noise_Pa);
   for (std::size_t i = 0; i < t_us.size(); i++) {
     taken.t_us = t_us[i];

@@ -107,10 +107,10 @@ class Random:
 
     def some_of(self, sensors, count):
         """Bitmaps of `count` of this many sensors."""
-        usable = np.full(len(self.states), (1 << sensors) - 1, np.uint32)
+        usable = np.full(len(self.states), (1 << sensors) - 1, np.uint64)
         left = np.full(len(usable), sensors)
         while (more := left > count).any():
-            bit = np.where(more, np.uint32(1) << self.below(sensors, of=more).astype(np.uint32), np.uint32(0))
+            bit = np.where(more, np.uint64(1) << self.below(sensors, of=more).astype(np.uint64), np.uint64(0))
             left -= (usable & bit) > 0
             usable &= ~bit
         return usable

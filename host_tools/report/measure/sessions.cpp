@@ -99,7 +99,7 @@ calibrating::Placement SessionPad::place(const twin::ContactTable &foot, double 
   report(DOWN_s, 1.0);
   calibrating::Placement placement;
   placement.t_s = t_s_ + 0.5 * (SETTLED_BEGIN_s + SETTLED_END_s);
-  placement.usable = (1u << x_mm_.size()) - 1u;
+  placement.usable = first_sensors(static_cast<unsigned>(x_mm_.size()));
   placement.noise_Pa = noise_of_one_Pa() / std::sqrt(FRAMES_PER_s * (SETTLED_END_s - SETTLED_BEGIN_s));
   placement.reading_Pa.assign(x_mm_.size(), 0.0);
   double first_Pa = 0.0, last_Pa = 0.0;

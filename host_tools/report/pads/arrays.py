@@ -10,7 +10,7 @@ from emulated import pressed
 from scenes import CONTACT_FROM_s, ROOT, SCENES, build, cycles, sizes
 
 SCENE, OSR, PITCH_mm, SIGMA_mm, PEAK_Pa = "grasp", 256, 9.0, 5.7, 25000.0  # as the boards' own images
-RECTANGLES = ("2x2", "2x4", "3x3", "3x5", "4x4", "4x5", "5x6")
+RECTANGLES = ("2x2", "2x4", "3x3", "3x5", "4x4", "4x5", "5x6", "6x6")
 FREE = ("4x8",)  # more along one side than the fixed-point kernels take
 LINES = 15  # a parallel board has a data line for each sensor
 SHOWN = ("flash_bytes", "ram_bytes", "stack_bytes", "cycles_of_frame")

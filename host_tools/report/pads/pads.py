@@ -30,7 +30,7 @@ def p99_9_um(measure, columns, rows, count, random):
     sigma_mm, p0_Pa = random.uniform(3.5, 8.0, count), 10.0 ** random.uniform(3.7, 4.7, count)
     pressure_Pa = presses.gaussian_Pa(compared.x_mm, compared.y_mm, x_mm, y_mm, sigma_mm, p0_Pa)
     readings = q10(pressure_Pa + NOISE_Pa * random.normal(size=pressure_Pa.shape))
-    best = compared.optimum(readings, np.full(count, (1 << columns * rows) - 1, np.uint32), np.full(count, NOISE_Pa))
+    best = compared.optimum(readings, np.full(count, (1 << columns * rows) - 1, np.uint64), np.full(count, NOISE_Pa))
     settings = measure.settings(noise_Pa=NOISE_Pa, iterations=ITERATIONS, cut_noises=0)
     found = measure.fit(measure.array(compared.x_mm, compared.y_mm, arrays.PITCH_mm), settings, readings)
     judged = best["observable"] & ~best["at_bound"]

@@ -6,7 +6,6 @@
     rate.json    the figures by which the rate is judged, with their goals; all tables of rate.md
     rate.md      the same to read
     rate.png     the same to look at
-    scenes.png   what each scene computes, leaves out, and takes
 
 text.md.in describes what is measured.
 """
@@ -140,8 +139,7 @@ def main(argv):
         of_grasp = grasp_rate.figures(grasp)
     found = judge(figures(runs, resting, rows) | of_grasp, GOALS)
     found |= {"by_osr": by_osr(runs), "scenes": rows}
-    pictures = {"rate.png": lambda path: rate_report.draw(path, found, runs[PARALLEL, 256])}
-    return publish(found, options, "rate", pictures | {"scenes.png": lambda path: rate_report.draw_scenes(path, rows)})
+    return publish(found, options, "rate", {"rate.png": lambda path: rate_report.draw(path, found, runs[PARALLEL, 256])})
 
 
 if __name__ == "__main__":

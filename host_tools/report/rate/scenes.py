@@ -9,7 +9,7 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 from boards import BOARDS  # noqa: E402
-from emulated import CLOCK_Hz, CONVERSION_us, Tools, scenario  # noqa: E402
+from emulated import CONVERSION_us, Tools, scenario  # noqa: E402
 from reporting import run  # noqa: E402
 
 SCENES = ("raw", "press", "slip", "grasp", "shapes", "paper")
@@ -28,8 +28,6 @@ STREAM = dict.fromkeys(SCENES, "contact") | {"raw": "raw"}
 # The contact of the scenario "wander" stands from 0.65 s on; windows of whole temperature intervals.
 REST_s = (0.5, 0.58)
 CONTACT_FROM_s, WINDOW_s, SETTLE_s = 1.0, 1.0, 0.1
-# The watchdog and the record of a crash (boards/rp2040/crash.h): what runs all the time, and what they are compiled from.
-GUARD_FUNCTIONS, GUARD_OBJECTS = ("port_alive", "port_at", "port_event", "port_watchdog_feed", "stuck_parts"), ("crash.c", "fault.S")
 
 
 def capabilities():
@@ -75,21 +73,7 @@ def sizes(place, board):
         "ram_bytes": image["constants_in_sram_bytes"] + image["variables_bytes"] + image["stack_reserved_bytes"],
         "code_in_sram_bytes": image["code_in_sram_bytes"],
         "stack_bytes": stack["worst_bytes"],
-        **guard_sizes(place),
     }
-
-
-def guard_sizes(place):
-    found = {"guard_flash_bytes": 0, "guard_ram_bytes": 0}
-    for name in GUARD_OBJECTS:
-        sections = run("arm-none-eabi-size", "-A", place / f"boards/rp2040/CMakeFiles/board_rp2040.dir/{name}.obj")
-        for line in sections.splitlines():
-            kind, _, rest = line.partition(" ")
-            if kind.startswith((".text", ".rodata", ".data")):
-                found["guard_flash_bytes"] += int(rest.split()[0])
-            elif kind.startswith((".bss", ".noinit")):
-                found["guard_ram_bytes"] += int(rest.split()[0])
-    return found
 
 
 def cycles(command_frame, place, scene, board, osrs, folder, contact=None, root=ROOT):
@@ -113,10 +97,7 @@ def cycles(command_frame, place, scene, board, osrs, folder, contact=None, root=
     path = contact(t_s + 1) if contact else scenario(folder, "wander", t_s + 1, f"{scene}-{board}")
     found = json.loads(run("node", root / "host_tools/report/rate/stage_cycles.mjs", *image, "--scenario", path, *windows))
     contact = found[str(osrs[0])]
-    guards = sum(cycles for name, cycles in contact["functions"].items() if set(name.split("=")) & set(GUARD_FUNCTIONS))
     return {
-        "guard_cycles": guards,
-        "guard_percent": 100 * guards * contact["frames_per_s"] / CLOCK_Hz,
         "cycles_of_frame_at_rest": found["rest"]["total_cycles_per_frame"],
         "cycles_of_frame": contact["total_cycles_per_frame"],
         "cycles_by_stage": contact["cycles_per_frame"],

@@ -6,7 +6,7 @@
  * symbols of BASE.elf. A stage is a function that the main loop calls, or an interrupt, with all that it calls; what the main loop does
  * besides is "other". Interrupts are counted as their own stages, wherever they strike.
  *
- * Prints {window: {frames, frames_per_s, cycles_per_frame: {stage: cycles}, total_cycles_per_frame, busy_percent, functions: {name: cycles}}}.
+ * Prints {window: {frames, frames_per_s, cycles_per_frame: {stage: cycles}, total_cycles_per_frame, busy_percent}}.
  */
 import { execFileSync } from 'node:child_process';
 import { readFileSync } from 'node:fs';
@@ -40,7 +40,6 @@ const RAM = 0x20000000;
 
 class StageMeter {
   constructor(functions) {
-    this.functions = functions;
     this.stages = [...new Set([...Object.values(STAGES), ...Object.values(INTERRUPTS), 'other'])];
     this.entry = new Uint8Array(1 << 18);
     this.frameEntry = 0;
@@ -55,7 +54,6 @@ class StageMeter {
 
   reset() {
     this.cycles = new Float64Array(this.stages.length);
-    this.byPlace = new Float64Array(1 << 17);
     this.frames = 0;
   }
 
@@ -111,7 +109,6 @@ class StageMeter {
         executeOriginal.call(core, before + 1, NEVER);
         const spent = core.cycles - before - meter.charged;
         meter.cycles[stage] += spent;
-        if (at >= 0 && at < 1 << 18) meter.byPlace[at >> 1] += spent;
         if (meter.left) {
           stage = calls.pop()?.stage ?? other; // none: the counting began within this exception
           depth = Math.max(0, depth - 1);
@@ -119,37 +116,21 @@ class StageMeter {
       }
     };
   }
-
-  /** [{name, cycles}] by cycles, of one frame. */
-  functionsOfFrame() {
-    return this.functions
-      .map(({ name, start, end }) => {
-        let cycles = 0;
-        for (let at = Math.max(0, start - RAM); start >= RAM && at < end - RAM; at += 2) cycles += this.byPlace[at >> 1];
-        return { name, cycles: cycles / this.frames };
-      })
-      .filter((f) => f.cycles > 0)
-      .sort((a, b) => b.cycles - a.cycles);
-  }
 }
 const NEVER = Object.freeze({ earliestChanged: false });
 
-/** The functions of an image: [{name, start, end}], by address, aliases joined with "=". */
+/** The functions of an image: [{name, start}], aliases joined with "=". */
 function readFunctions(path) {
   const byStart = new Map();
   for (const line of execFileSync('arm-none-eabi-nm', ['-p', '-f', 'sysv', path], { encoding: 'utf8' }).split('\n')) {
-    const [name, value, , type, size] = line.split('|').map((cell) => cell.trim());
+    const [name, value, , type] = line.split('|').map((cell) => cell.trim());
     if (type !== 'FUNC') continue;
     const start = Number.parseInt(value, 16) & ~1;
     const known = byStart.get(start);
     if (known) known.name += `=${name}`;
-    else byStart.set(start, { name, start, bytes: Number.parseInt(size || '0', 16) });
+    else byStart.set(start, { name, start });
   }
-  const functions = [...byStart.values()].sort((a, b) => a.start - b.start);
-  functions.forEach((f, i) => {
-    f.end = f.bytes ? f.start + f.bytes : (functions[i + 1]?.start ?? f.start + 2);
-  });
-  return functions;
+  return [...byStart.values()];
 }
 
 process.on('uncaughtException', (error) => {
@@ -187,7 +168,6 @@ for (const { name, from_s, to_s } of windows) {
     cycles_per_frame: Object.fromEntries(meter.stages.map((stage, i) => [stage, Math.round(meter.cycles[i] / meter.frames)])),
     total_cycles_per_frame: Math.round(busy / meter.frames),
     busy_percent: (100 * busy) / ((to_s - from_s) * machine.Board.clkSys_Hz),
-    functions: Object.fromEntries(meter.functionsOfFrame().map((f) => [f.name, Math.round(f.cycles)])),
   };
 }
 if (machine.result.warnings.length) throw new Error(machine.result.warnings.join('; '));

@@ -234,7 +234,7 @@ Box box_of(const Array &array) {
 
 } // namespace
 
-Fit fit(const Array &array, const double *pressure_Pa, std::uint32_t usable, double noise_Pa, const Parameters *start, bool all_starts) {
+Fit fit(const Array &array, const double *pressure_Pa, std::uint64_t usable, double noise_Pa, const Parameters *start, bool all_starts) {
   std::vector<std::size_t> order;
   for (std::size_t k = 0; k < array.x_mm.size(); k++) {
     if (usable >> k & 1u) {

@@ -39,6 +39,6 @@ struct Fit {
 
 // pressure_Pa[sensor]; usable: bitmap of the sensors to use, at least four, one of them positive. start: a first guess beside the built-in
 // ones (every sensor among the four strongest, at three widths), or nullptr. all_starts: Ceres from every start, always.
-Fit fit(const Array &array, const double *pressure_Pa, std::uint32_t usable, double noise_Pa, const Parameters *start, bool all_starts);
+Fit fit(const Array &array, const double *pressure_Pa, std::uint64_t usable, double noise_Pa, const Parameters *start, bool all_starts);
 
 } // namespace fingertip::reference

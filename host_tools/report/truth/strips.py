@@ -125,7 +125,7 @@ class Strip:
 def conditioned(firmware, t_s, pressure_Pa, noise_Pa):
     """What the firmware's condition makes of frames: contact, doubtful, usable [frame], and pressures [frame][sensor] above the zeros, 1/1024 Pa."""
     readings = q10(pressure_Pa)
-    flags, usable, above = np.zeros(len(t_s), np.uint8), np.zeros(len(t_s), np.uint32), np.zeros_like(readings)
+    flags, usable, above = np.zeros(len(t_s), np.uint8), np.zeros(len(t_s), np.uint64), np.zeros_like(readings)
     firmware.call("gate_series", noise_Pa, (1e6 * (1.0 + t_s)).astype(np.uint64), readings, flags, usable, above, np.zeros(0, np.int32))
     return flags & 1 > 0, flags & 2 > 0, usable, above
 
@@ -155,7 +155,10 @@ class Presses:
     def __init__(self, firmware, strip):
         self.firmware = firmware
         contact, doubtful, usable, pressure = conditioned(firmware, strip.t_s - strip.t_s[0], strip.pressure_Pa, NOISE_Pa)
-        strong = np.where(usable[:, None] >> np.arange(SENSORS) & 1, pressure, 0).max(axis=1) >= 1024 * LOCATED_LEAST_Pa
+        strong = (
+            np.where(usable[:, None] >> np.arange(SENSORS, dtype=np.uint64) & np.uint64(1), pressure, 0).max(axis=1)
+            >= 1024 * LOCATED_LEAST_Pa
+        )
         used = contact & ~doubtful & strong
         x_mm, full, pressure = strip.x_mm[used], strip.full[used], pressure[used]
         odd = round_half_away(x_mm).astype(int) % 2 != 0

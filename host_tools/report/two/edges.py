@@ -41,7 +41,7 @@ def answers(contacts, pads, seeds, objects, share, rubber, overhang_mm, seed):
         readings_Pa = pads["gain"][:, None] * contacts.rubber(rubber, LAYER_mm, seeds, t_s, base_Pa)
         readings = q10(readings_Pa + noise_Pa * times.standard_normal(base_Pa.shape))
         t_us, past = (1e6 * (1.0 + t_s)).astype(np.uint64), np.zeros((len(pads), SENSORS), np.int32)
-        flags, usable, above = np.zeros(len(t_s), np.uint8), np.zeros(len(t_s), np.uint32), np.zeros_like(readings)
+        flags, usable, above = np.zeros(len(t_s), np.uint8), np.zeros(len(t_s), np.uint64), np.zeros_like(readings)
         for i in range(len(pads)):
             contacts.call("gate_series", noise_Pa, t_us, readings[i], flags, usable, above[i], past[i])
         yield touch, contacts.held_shapes(above[:, held] / 1024, pads, noise_Pa, none, contacts.pad_profile(LAYER_mm), past / 1024)[0][:, 1]

@@ -93,8 +93,8 @@ export function parseScenario(text, file) {
     if (!header) {
       header = cells;
       sensors = Number(metadata.sensors ?? 15);
-      if (!Number.isInteger(sensors) || sensors < 1 || sensors > 32)
-        fail(number, `metadata "sensors" is "${metadata.sensors}"; give a whole number from 1 to 32`);
+      if (!Number.isInteger(sensors) || sensors < 1 || sensors > 36)
+        fail(number, `metadata "sensors" is "${metadata.sensors}"; give a whole number from 1 to 36`);
       for (const key of ['ambient_Pa', 'temperature_degC']) {
         if (metadata[key] !== undefined && !Number.isFinite(Number(metadata[key] || NaN)))
           fail(number, `metadata "${key}" is "${metadata[key]}"; give a number`);

@@ -19,7 +19,7 @@ struct native_fingertip_settings {
   float prior_width_mm;
   const struct pad_profile *pad; /* the profile in use, which outlives the fingertip; NULL: the stored one */
   struct sim_world world;
-  uint32_t absent;      /* bitmap of the sensors that are not fitted */
+  sensor_map absent;    /* bitmap of the sensors that are not fitted */
   bool parallel_bus;    /* a data line for each sensor (sim_array.h): faster than multiplexers */
   const uint8_t *flash; /* [NATIVE_FLASH_BYTES] what it had kept (native_flash.h); NULL: nothing */
 };

@@ -83,9 +83,9 @@ Scenario::Scenario(const std::string &path) {
         }
         return value;
       };
-      const double sensors = given("sensors", 15, 32, "a whole number from 1 to 32");
+      const double sensors = given("sensors", 15, 36, "a whole number from 1 to 36");
       if (sensors < 1 || sensors > 32 || sensors != std::floor(sensors)) {
-        fail("metadata \"sensors\" must be a whole number from 1 to 32");
+        fail("metadata \"sensors\" must be a whole number from 1 to 36");
       }
       sensors_ = static_cast<unsigned>(sensors);
       ambient_Pa_ = given("ambient_Pa", ambient_Pa_, PRESSURE_LIMIT_Pa, "at most 1e7 Pa");

@@ -95,7 +95,7 @@ static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, 
       const double *const readings = reading_Pa.row(session) + i * count;
       for (std::size_t k = 0; k < count; k++) {
         const bool there = readings[k] == readings[k];
-        placement.usable |= there ? 1u << k : 0u;
+        placement.usable |= there ? sensor_bit(static_cast<unsigned>(k)) : 0;
         placement.reading_Pa.push_back(there ? readings[k] : 0.0);
       }
     }

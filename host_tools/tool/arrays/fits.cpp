@@ -50,7 +50,7 @@ static void default_settings(Batch<fit_settings, 1> settings) {
 }
 MEASURE_ENTRY(default_settings)
 
-using Kernel = void (*)(const fit_array *, const std::int32_t *, std::uint32_t, const fit_settings *, fit_result *);
+using Kernel = void (*)(const fit_array *, const std::int32_t *, sensor_map, const fit_settings *, fit_result *);
 
 static Kernel kernel_named(const std::string &name) {
   if (name == "fit") {
@@ -60,11 +60,12 @@ static Kernel kernel_named(const std::string &name) {
     return fit_gaussian_grid;
   }
   if (name == "grid") {
-    return [](const fit_array *array, const std::int32_t *pressure_Pa_q10, std::uint32_t, const fit_settings *settings,
-              fit_result *result) { fit_grid(array, pressure_Pa_q10, settings, result); };
+    return [](const fit_array *array, const std::int32_t *pressure_Pa_q10, sensor_map, const fit_settings *settings, fit_result *result) {
+      fit_grid(array, pressure_Pa_q10, settings, result);
+    };
   }
   if (name == "masked") {
-    return [](const fit_array *array, const std::int32_t *pressure_Pa_q10, std::uint32_t usable, const fit_settings *settings,
+    return [](const fit_array *array, const std::int32_t *pressure_Pa_q10, sensor_map usable, const fit_settings *settings,
               fit_result *result) { fit_grid_masked(array, pressure_Pa_q10, usable, settings, result); };
   }
   if (name == "general") {
@@ -76,7 +77,7 @@ static Kernel kernel_named(const std::string &name) {
 // kernel: "grid", "masked", "general", "fit" (fit_gaussian) or "fit_grid" (fit_gaussian_grid). us: of one fit, if a
 // single thread runs them.
 static void fit(std::string kernel, std::int64_t threads, Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
-                Batch<const fit_own, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const std::uint32_t, 1> usable,
+                Batch<const fit_own, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const sensor_map, 1> usable,
                 Batch<fit_result, 1> results, Batch<double, 1> us) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(1), own);
   same_length(results, pressure_Pa_q10, usable);
@@ -97,7 +98,7 @@ MEASURE_ENTRY(fit)
 // Fit of held presses [press][frame][sensor]: that of the last frame, with what the search for a tangential force that
 // is not estimated has found in the frames before. A single frame is not searched.
 static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
-                     Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const std::uint32_t, 2> usable, Batch<fit_result, 1> results) {
+                     Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable, Batch<fit_result, 1> results) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   same_length(results, pressure_Pa_q10, usable);
   length_or_one(results, all_settings);

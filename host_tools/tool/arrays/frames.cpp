@@ -102,7 +102,7 @@ static void chain(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1>
       input.t_us = taken.t_us;
       input.contact = reading.contact;
       input.tared = reading.tared;
-      input.masked = reading.usable != UINT32_MAX >> (FT_MAX_SENSORS - taken.sensor_count);
+      input.masked = reading.usable != first_sensors(taken.sensor_count);
       input.zero_doubtful = reading.zero_doubtful;
       input.saturated = taken.saturated;
       input.fit = reading.contact ? &fit : nullptr;
@@ -148,8 +148,8 @@ MEASURE_ENTRY(shapes_pad)
 // Fit and tangential estimate of contacts [contact][frame][sensor], each from its first frame on; saturated: bitmap of the sensors that are
 // left out, usable of those that are not missing. Frames whose fit is not worthwhile have no estimate, and the one after begins again.
 static void tangential(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1> pads, Batch<const fit_settings, 1> all_settings,
-                       Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const std::uint32_t, 2> usable,
-                       Batch<const std::uint32_t, 2> saturated, Batch<fit_result, 2> fits, Batch<fit_tangential, 2> results) {
+                       Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable,
+                       Batch<const sensor_map, 2> saturated, Batch<fit_result, 2> fits, Batch<fit_tangential, 2> results) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   same_length(results, fits, pressure_Pa_q10, usable, saturated);
   length_or_one(results, all_settings, pads);
@@ -162,7 +162,7 @@ static void tangential(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1>
     fit_tangential_state state{};
     for (std::size_t i = 0; i < results.size(1); i++) {
       const std::int32_t *pressure = pressure_Pa_q10.row(contact) + i * pressure_Pa_q10.size(2);
-      const std::uint32_t left_out = saturated.row(contact)[i];
+      const sensor_map left_out = saturated.row(contact)[i];
       fit_result &fit = fits.row(contact)[i];
       fit_tangential &result = results.row(contact)[i];
       result = {};

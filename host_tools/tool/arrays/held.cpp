@@ -100,7 +100,7 @@ MEASURE_RECORD(shapes_place, FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm))
 // The shapes, as scene grasp has them, of contacts [contact][frame][sensor] that are held: after FIT_SHAPES_FRAMES
 // frames the first answer, and the last. Where the tangential force is estimated, its location is used.
 static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes_pad, 1> pad, Batch<const fit_settings, 1> all_settings,
-                        Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const std::uint32_t, 2> usable,
+                        Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable,
                         Batch<const published, 1> estimates, Batch<fit_shapes_result, 2> results, Batch<shapes_place, 2> places) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
@@ -147,7 +147,7 @@ static void motion_flags(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 
   same_length(flags, t_us, pressure_Pa_q10, pressed);
   length_or_one(end, all_settings);
   require(end.size() == 0 || end[end.size() - 1] == pressure_Pa_q10.shape[0], "runs of another number of frames");
-  const std::uint32_t usable = (1u << pressure_Pa_q10.size(1)) - 1u;
+  const sensor_map usable = first_sensors(static_cast<unsigned>(pressure_Pa_q10.size(1)));
   const contact_settings contact{DEFAULT_SLIP_THRESHOLD_mm, DEFAULT_SLIP_WINDOW_ms * 1000u, DEFAULT_FORCE_SCALE, DEFAULT_FORCE_SCALE_SD};
   tangential_settings published{};
   published.force_scale = published.tangential_scale = 1.0F;

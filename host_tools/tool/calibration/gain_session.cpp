@@ -22,7 +22,7 @@ static double mean_zero_Pa(const Frame &frame) {
   double sum_Pa = 0.0, count = 0.0;
   for (std::size_t k = 0; k < frame.zero_Pa.size(); k++) {
     sum_Pa += frame.valid >> k & 1u ? frame.zero_Pa[k] : 0.0;
-    count += frame.valid >> k & 1u;
+    count += frame.valid >> k & 1u ? 1.0 : 0.0;
   }
   return count > 0.0 ? sum_Pa / count : 0.0;
 }

@@ -128,7 +128,7 @@ bool is_loaded(const std::vector<Placement> &placements, const Solution &solutio
 bool measures_nothing(const Array &array, const std::vector<Placement> &placements, std::size_t k) {
   std::vector<Placement> without = placements;
   for (Placement &placement : without) {
-    placement.usable &= ~(1u << k);
+    placement.usable &= ~sensor_bit(static_cast<unsigned>(k));
   }
   const Solution others = solve(array, without);
   double measured = 0.0, expected = 0.0;
@@ -372,7 +372,7 @@ bool goes_astray(const Array &array, const Solution &s) {
   for (double x = *left; x <= *right; x += array.pitch_mm / STEPS) {
     for (double y = *bottom; y <= *top; y += array.pitch_mm / STEPS) {
       Placement press;
-      press.usable = (1u << array.sensors()) - 1u;
+      press.usable = first_sensors(static_cast<unsigned>(array.sensors()));
       for (std::size_t k = 0; k < array.sensors(); k++) {
         const double per = std::pow(std::hypot(array.x_mm[k] - x, array.y_mm[k] - y) / s.width_mm, 2) / 2.0;
         const double there =
@@ -412,7 +412,7 @@ Judgement judge(const Array &array, std::vector<Placement> placements, bool last
   const bool enough = placements.size() >= PLACEMENTS_ENOUGH;
   j.wanted_sd = enough ? std::max(SHAPE_SD_WANTED, helps) : SHAPE_SD_WANTED;
   const double wanted_gauge_sd = enough ? std::max(GAUGE_SD_WANTED, helps) : GAUGE_SD_WANTED;
-  std::uint32_t seen = 0;
+  sensor_map seen = 0;
   for (const Placement &placement : placements) {
     seen |= placement.usable;
   }

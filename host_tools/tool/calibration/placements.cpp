@@ -72,7 +72,7 @@ std::optional<Placement> PlacementFinder::take(const Frame &frame) {
 }
 
 /* Means over the slots that begin in this time; sensors that were measured often enough. */
-std::vector<double> PlacementFinder::mean_of(double begin_s, double end_s, std::uint32_t *seen) const {
+std::vector<double> PlacementFinder::mean_of(double begin_s, double end_s, sensor_map *seen) const {
   std::vector<double> sums(sensors_, 0.0), counts(sensors_, 0.0);
   double frames = 0.0;
   for (const Slot &slot : slots_) {
@@ -87,7 +87,7 @@ std::vector<double> PlacementFinder::mean_of(double begin_s, double end_s, std::
   *seen = 0;
   for (std::size_t k = 0; k < sensors_; k++) {
     sums[k] /= std::max(counts[k], 1.0);
-    *seen |= counts[k] > 0.0 && counts[k] >= SEEN_MIN * frames ? std::uint32_t{1} << k : 0u;
+    *seen |= counts[k] > 0.0 && counts[k] >= SEEN_MIN * frames ? sensor_bit(static_cast<unsigned>(k)) : 0;
   }
   return sums;
 }
@@ -95,7 +95,7 @@ std::vector<double> PlacementFinder::mean_of(double begin_s, double end_s, std::
 /* What the sensors read with nothing on the pad, by the time just before this. */
 void PlacementFinder::find_rest(double t_s) {
   const double end_s = t_s - BEFORE_TOUCH_s;
-  std::uint32_t seen = 0;
+  sensor_map seen = 0;
   const std::vector<double> mean = mean_of(std::max(end_s - REST_s, rest_from_s_), end_s, &seen);
   if (rest_Pa_.empty()) {
     rest_Pa_.assign(sensors_, 0.0);
@@ -160,7 +160,7 @@ std::optional<Placement> PlacementFinder::close(const Slot &slot) {
 /* Judges the last half second. Where it was not still, the same is tried a slot later. */
 std::optional<Placement> PlacementFinder::settled(double t_s) {
   const double begin_s = t_s - (STILL_s - READ_FROM_s);
-  std::uint32_t seen = 0;
+  sensor_map seen = 0;
   const std::vector<double> mean = mean_of(begin_s, t_s, &seen);
   Placement placement;
   placement.t_s = 0.5 * (begin_s + t_s);

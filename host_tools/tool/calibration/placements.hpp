@@ -31,7 +31,7 @@ constexpr double FRAME_RATE_MIN_Hz = 12.0;
 
 struct Frame {
   double t_s = 0.0;
-  std::uint32_t valid = 0;                  /* bitmap: measured, and within the sensor's range */
+  sensor_map valid = 0;                     /* bitmap: measured, and within the sensor's range */
   std::vector<double> pressure_Pa, zero_Pa; /* [sensor] absolute; the firmware's zero */
 };
 
@@ -67,7 +67,7 @@ private:
 
   void restart();
   std::optional<Placement> close(const Slot &slot);
-  std::vector<double> mean_of(double begin_s, double end_s, std::uint32_t *seen) const;
+  std::vector<double> mean_of(double begin_s, double end_s, sensor_map *seen) const;
   void find_rest(double t_s);
   std::optional<Placement> settled(double t_s);
 

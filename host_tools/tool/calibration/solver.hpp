@@ -34,6 +34,8 @@
  * dropped as a whole. The same input gives the same bits. Thirty placements of fifteen sensors take some 10 ms. */
 #pragma once
 
+#include "common/limits.h"
+
 #include <cstdint>
 #include <vector>
 
@@ -49,7 +51,7 @@ struct Array {
 struct Placement {
   double t_s = 0.0;               /* of the readings, on any clock that goes on */
   std::vector<double> reading_Pa; /* [sensor] above zero, mean over the frames */
-  std::uint32_t usable = 0;       /* bitmap of the sensors whose reading is a measurement */
+  sensor_map usable = 0;          /* bitmap of the sensors whose reading is a measurement */
   std::vector<double> rest_Pa;    /* [sensor] just before it, of any origin; empty: not known */
   std::vector<double> earlier_Pa; /* [sensor] M: what is left of those before (set_earlier); empty: none */
   double noise_Pa = 0.0;          /* sd of a mean */

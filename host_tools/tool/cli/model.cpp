@@ -114,7 +114,7 @@ bool Model::is_current() const {
 
 bool Model::is_tared() const { return raw_ ? raw_->flags & CONTACT_FLAG_TARED : contact_ && (contact_->flags & CONTACT_FLAG_TARED); }
 
-std::uint32_t Model::missing_sensors() const {
+sensor_map Model::missing_sensors() const {
   return info_ && health_ ? fingertip::missing_sensors(health_->sensors_present, info_->sensor_count) : 0;
 }
 

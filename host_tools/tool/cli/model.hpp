@@ -89,7 +89,7 @@ public:
   const std::optional<wire_raw> &raw() const { return raw_; }
   const std::optional<wire_health> &health() const { return health_; }
   /* Bits of the sensors that do not answer, as of the last health packet. */
-  std::uint32_t missing_sensors() const;
+  sensor_map missing_sensors() const;
   bool is_without_sensors() const;
 
   /* Frames since the first, and their device time. */

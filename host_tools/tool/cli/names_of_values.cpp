@@ -3,14 +3,13 @@
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
-#include <bitset>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
 
 namespace fingertip {
 
-std::string sensors_text(std::uint32_t sensors) {
+std::string sensors_text(sensor_map sensors) {
   std::string text;
   for (int k = 0; k < FT_MAX_SENSORS; k++) {
     text += sensors >> k & 1u ? " " + std::to_string(k) : "";
@@ -18,15 +17,12 @@ std::string sensors_text(std::uint32_t sensors) {
   return std::string(trim(text));
 }
 
-std::uint32_t missing_sensors(std::uint32_t present, std::uint8_t sensor_count) {
-  std::uint64_t all = (std::uint64_t{1} << sensor_count) - 1u;
-  return static_cast<std::uint32_t>(all) & ~present;
-}
+sensor_map missing_sensors(sensor_map present, std::uint8_t sensor_count) { return (sensor_bit(sensor_count) - 1) & ~present; }
 
-std::string present_text(std::uint32_t present, std::uint8_t sensor_count) {
-  std::uint32_t missing = missing_sensors(present, sensor_count);
-  auto count = sensor_count - std::bitset<32>(missing).count();
-  return std::to_string(count) + " of " + std::to_string(sensor_count) + (missing ? ", missing: " + sensors_text(missing) : "");
+std::string present_text(sensor_map present, std::uint8_t sensor_count) {
+  sensor_map missing = missing_sensors(present, sensor_count);
+  return std::to_string(sensor_count - count_sensors(missing)) + " of " + std::to_string(sensor_count) +
+         (missing ? ", missing: " + sensors_text(missing) : "");
 }
 
 std::string rate_text(std::uint32_t rate_mHz) { return rate_mHz ? fixed(rate_mHz / 1000.0, 3) : "max"; }

@@ -10,13 +10,13 @@
 namespace fingertip {
 
 /* "3 7": the sensors of these bits; "" for none. */
-std::string sensors_text(std::uint32_t sensors);
+std::string sensors_text(sensor_map sensors);
 
 /* The sensors of a count that are not among the present ones. */
-std::uint32_t missing_sensors(std::uint32_t present, std::uint8_t sensor_count);
+sensor_map missing_sensors(sensor_map present, std::uint8_t sensor_count);
 
 /* "13 of 15, missing: 3 7" */
-std::string present_text(std::uint32_t present, std::uint8_t sensor_count);
+std::string present_text(sensor_map present, std::uint8_t sensor_count);
 
 /* "20.000", in Hz, or "max" */
 std::string rate_text(std::uint32_t rate_mHz);

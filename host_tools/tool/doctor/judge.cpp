@@ -52,7 +52,7 @@ std::string list(const std::vector<unsigned> &sensors) {
   return (sensors.size() == 1 ? "sensor " : "sensors ") + joined(sensors, ", ", [](unsigned sensor) { return std::to_string(sensor); });
 }
 
-std::vector<unsigned> sensors_in(std::uint32_t bitmap) {
+std::vector<unsigned> sensors_in(sensor_map bitmap) {
   std::vector<unsigned> sensors;
   for (unsigned k = 0; k < FT_MAX_SENSORS; k++) {
     if (bitmap >> k & 1u) {
@@ -73,7 +73,7 @@ public:
   explicit Judge(const Facts &facts) : facts_(facts) {
     if (facts.info) {
       wiring_ = Wiring::of_board(text_field(facts.info->board));
-      all_ = static_cast<std::uint32_t>((std::uint64_t{1} << facts.info->sensor_count) - 1);
+      all_ = first_sensors(facts.info->sensor_count);
     }
     if (facts.after && facts.info) {
       missing_ = all_ & ~facts.after->sensors_present;
@@ -216,10 +216,10 @@ private:
           wiring_ ? wiring_->check_all() : "check supply and clock", sensors_in(missing_));
       return;
     }
-    std::uint32_t left = missing_;
+    sensor_map left = missing_;
     if (wiring_ && wiring_->has_multiplexers()) {
       for (unsigned strip = 0; strip * wiring_->sensors_of_strip < wiring_->sensor_count; strip++) {
-        std::uint32_t of_strip = wiring_->sensors_of(strip);
+        sensor_map of_strip = wiring_->sensors_of(strip);
         if ((left & of_strip) == of_strip) {
           left &= ~of_strip;
           missing_strip(strip, of_strip);
@@ -233,7 +233,7 @@ private:
 
   /* A multiplexer that is silent costs NACKs. A line behind it that is held low stops the bus, and
    * the firmware tries it ever more rarely: so since start. */
-  void missing_strip(unsigned strip, std::uint32_t sensors) {
+  void missing_strip(unsigned strip, sensor_map sensors) {
     char address[8];
     std::snprintf(address, sizeof address, "0x%02x", *wiring_->place(strip * wiring_->sensors_of_strip).multiplexer);
     const bool held = facts_.after->bus_timeouts > 0;
@@ -559,7 +559,7 @@ private:
 
   const Facts &facts_;
   std::optional<Wiring> wiring_;
-  std::uint32_t all_ = 0, missing_ = 0; /* bitmaps */
+  sensor_map all_ = 0, missing_ = 0; /* bitmaps */
   std::vector<Finding> findings_;
 };
 

@@ -15,7 +15,7 @@ constexpr std::size_t COMPANY_MIN = 5;
 /* The median of |x| of a Gaussian of standard deviation 1 is 1 / 1.4826; a step holds two noises. */
 constexpr double NOISE_OF_MEDIAN_STEP = 1.4826 / 1.41421356;
 
-static bool has(std::uint32_t bitmap, unsigned sensor) { return (bitmap >> sensor & 1u) != 0; }
+static bool has(sensor_map bitmap, unsigned sensor) { return (bitmap >> sensor & 1u) != 0; }
 
 static double median(std::vector<double> values) {
   auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -50,7 +50,7 @@ public:
 private:
   struct Reading {
     double t_s;
-    std::uint32_t valid;
+    sensor_map valid;
     float pressure_Pa[FT_MAX_SENSORS];
   };
 

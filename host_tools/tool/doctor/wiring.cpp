@@ -41,7 +41,9 @@ Place Wiring::place(unsigned sensor) const {
   return place;
 }
 
-std::uint32_t Wiring::sensors_of(unsigned strip) const { return ((1u << sensors_of_strip) - 1u) << (strip * sensors_of_strip); }
+std::uint64_t Wiring::sensors_of(unsigned strip) const {
+  return ((std::uint64_t{1} << sensors_of_strip) - 1) << (strip * sensors_of_strip);
+}
 
 std::string Wiring::place_text(unsigned sensor) const {
   Place at = place(sensor);

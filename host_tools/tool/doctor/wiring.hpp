@@ -23,7 +23,7 @@ struct Wiring {
 
   Place place(unsigned sensor) const;
   /* The sensors of a strip. */
-  std::uint32_t sensors_of(unsigned strip) const;
+  std::uint64_t sensors_of(unsigned strip) const;
   /* Whether a strip can fail as a whole. */
   bool has_multiplexers() const { return mux_address_0.has_value(); }
 

@@ -27,6 +27,8 @@ static void stop_unless(enum ft_status status) {
 }
 
 /* Silicone's, the products exact or rounded alike everywhere. */
+#define SENSORS_MOST 32 /* on every machine */
+
 static struct pad_profile layer_of(float thickness_mm) {
   return (struct pad_profile){
       .thickness_mm = thickness_mm,
@@ -55,11 +57,11 @@ void fit_bits_init(void) {
   }
   stop_unless(fit_array_init(&layouts[2], 19, x_mm, y_mm, 7.0f));
   draw_from(1);
-  for (int k = 0; k < FT_MAX_SENSORS; k++) { /* anywhere, some of them twice */
+  for (int k = 0; k < SENSORS_MOST; k++) { /* anywhere, some of them twice */
     x_mm[k] = k % 8 == 7 ? x_mm[k - 1] : (float)draw_between(-320, 320) / 16.0f;
     y_mm[k] = k % 8 == 7 ? y_mm[k - 1] : (float)draw_between(-320, 320) / 16.0f;
   }
-  stop_unless(fit_array_init(&layouts[3], FT_MAX_SENSORS, x_mm, y_mm, 8.0f));
+  stop_unless(fit_array_init(&layouts[3], SENSORS_MOST, x_mm, y_mm, 8.0f));
   for (int k = 0; k < PADS; k++) {
     const struct pad_profile profile = layer_of(5.0f * (float)(k + 1));
     stop_unless(fit_pad_init(&pads[k], &layouts[0], &profile));
@@ -155,7 +157,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   struct fit_own own[FT_MAX_SENSORS];
   if (press % 7 == 2) { /* on a pad so little that an estimate is still reported */
     const int32_t most_q15 = on_a_pad ? 300 : 9000;
-    for (int k = 0; k < FT_MAX_SENSORS; k++) {
+    for (int k = 0; k < SENSORS_MOST; k++) {
       own[k].off_x_q15 = draw_between(-most_q15 / 4, most_q15 / 4);
       own[k].off_y_q15 = draw_between(-most_q15 / 4, most_q15 / 4);
       own[k].wider_q15 = draw_between(-most_q15, most_q15);
@@ -164,7 +166,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   }
 
   if (press % 2) {
-    for (int k = 0; k < FT_MAX_SENSORS; k++) {
+    for (int k = 0; k < SENSORS_MOST; k++) {
       settings.gain_sd_q16[k] = (uint16_t)(draw_between(0, 1 << 16) >> draw_between(1, 12));
       settings.past_sd_Pa_q10[k] = draw_between(0, 1 << 20) >> draw_between(0, 12);
     }
@@ -242,5 +244,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     }
     return crc32_iso_hdlc((const uint8_t *)found, sizeof found);
   }
-  return crc32_iso_hdlc((const uint8_t *)&result, sizeof result);
+  /* As where a map has one word. */
+  const uint32_t before = ~crc32_iso_hdlc((const uint8_t *)&result, offsetof(struct fit_result, used));
+  return ~crc32_add_u32(crc32_add_u32(before, (uint32_t)result.used), result.flags);
 }

@@ -224,9 +224,9 @@ void Judge::judge_contact(std::uint64_t t_us, const wire_packet &packet) {
       const double allowed_mm = allowed_sds_ * static_cast<double>(contact.location_sd_mm);
       if (error_mm > std::max(LOCATION_BOUND_mm, allowed_mm) || share > FORCE_BOUND_SHARE) {
         wrong(t_us, text("frame %u, flags %05x: %.2f mm off, %.3f N instead of %.3f, at %.1f %.1f "
-                         "mm, sensors %04x, sd %.2f mm",
+                         "mm, sensors %04llx, sd %.2f mm",
                          contact.frame, flags, error_mm, static_cast<double>(contact.force_N), force_N, truth.x_mm, truth.y_mm,
-                         contact.sensors_used, static_cast<double>(contact.location_sd_mm)));
+                         static_cast<unsigned long long>(contact.sensors_used), static_cast<double>(contact.location_sd_mm)));
       }
     }
   } else if ((flags & CONTACT_FLAG_TARED) && !(flags & CONTACT_FLAG_CONTACT)) {
@@ -247,7 +247,7 @@ void Judge::judge_raw(std::uint64_t t_us, const wire_packet &packet) {
   raw_us_ = packet.t_us;
   const std::uint64_t measured_us = bench_us(packet.t_us);
   const bool warned = (raw.flags & WARNINGS) || !(raw.flags & CONTACT_FLAG_TARED);
-  const std::uint32_t trusted = warned ? 0 : raw.valid & ~raw.saturated & ~raw.doubtful;
+  const sensor_map trusted = warned ? 0 : raw.valid & ~raw.saturated & ~raw.doubtful;
   for (unsigned k = 0; k < SENSORS; k++) {
     if (!(trusted >> k & 1)) {
       continue;

@@ -56,7 +56,7 @@ static void look_at(const struct wire_packet *packet) {
     seen.held++;
     return;
   }
-  const uint32_t trusted = raw->valid & ~raw->saturated;
+  const sensor_map trusted = raw->valid & ~raw->saturated;
   const bool flagged = (raw->flags & CONTACT_FLAG_SENSOR_DOUBTFUL) != 0;
   bool right = true;
   seen.incomplete += trusted != seen.expected;

@@ -91,7 +91,7 @@ class Codec(DeviceTest):
             contact._replace(body=contact.body._replace(x_mm=math.inf)),
             contact._replace(sequence=65536),
             contact._replace(body=contact.body._replace(frame=-1)),
-            wire.Packet(0, 0, wire.Raw(0, 0, 0, 0, 0, 0, 33, (0,) * 66)),
+            wire.Packet(0, 0, wire.Raw(0, 0, 0, 0, 0, 0, 37, (0,) * 74)),
             wire.Packet(0, 0, wire.Raw(0, 0, 0, 0, 0, 0, 2, (0,) * 3)),
         ):
             with self.assertRaises(errors.FormatError):

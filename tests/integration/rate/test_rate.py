@@ -74,13 +74,6 @@ class Rate(report_case.ReportCase):
         by_chip = (1 - self.found["contact_sleep_percent"] / 100) * emulated.CLOCK_Hz / self.found["parallel_fps_osr256"]
         self.assertLess(abs(by_chip / slip["cycles_of_frame"] - 1), 0.02)
 
-    def test_guards_are_there_and_cheap(self):
-        for row in self.found["scenes"]:
-            self.assertGreater(row["guard_cycles"], 100)  # a few calls of some 20 cycles at the least
-            self.assertLess(row["guard_percent"], 1)
-            self.assertGreater(row["guard_flash_bytes"], 500)
-            self.assertGreater(row["guard_ram_bytes"], 200)
-
     def test_more_costs_more(self):
         raw, slip = (next(row for row in self.found["scenes"] if row["scene"] == scene) for scene in ("raw", "slip"))
         for name in ("flash_bytes", "ram_bytes", "code_in_sram_bytes", "stack_bytes", "cycles_of_frame"):
@@ -89,8 +82,7 @@ class Rate(report_case.ReportCase):
         self.assertGreater(slip["cycles_by_stage"]["fit"], 15000)
 
     def test_text_and_picture(self):
-        for name in ("rate.png", "scenes.png"):
-            self.assertEqual((self.folder / name).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual((self.folder / "rate.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
         text = (self.folder / "rate.md").read_text()
         for name, *_ in rate.GOALS:
             self.assertRegex(text, rf"\| {name} \| [0-9.]+ \| [<>]= [0-9]+ \| (met|MISSED) \|")

@@ -66,7 +66,7 @@ static void dip(uint32_t idle_ms, unsigned count, unsigned first, uint32_t phase
         found->wrong_unflagged_frames += is_wrong(&p.body.contact, sensors - count < 4);
         found->false_slips += (p.body.contact.flags & CONTACT_FLAG_SLIP) != 0;
       }
-      const uint32_t believed = p.type == WIRE_RAW ? p.body.raw.valid & ~p.body.raw.doubtful : 0;
+      const sensor_map believed = p.type == WIRE_RAW ? p.body.raw.valid & ~p.body.raw.doubtful : 0;
       for (unsigned k = 0; k < sensors; k++) {
         const double off_Pa = p.body.raw.pressure_Pa_q10[k] / 1024.0 - world_pressure_Pa(NULL, k, port_now_us());
         found->raw_valid_wrong += (believed >> k & 1) && fabs(off_Pa) > RAW_MAX_Pa;

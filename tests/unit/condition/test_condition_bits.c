@@ -61,8 +61,9 @@ static void draw_frame(int32_t period_us) {
 }
 
 static uint32_t with_frame(uint32_t crc) {
+  const uint32_t usable = (uint32_t)conditioned.usable;
   uint32_t words[7 + 2 * SENSORS] = {
-      crc, conditioned.usable, conditioned.tared, conditioned.contact, conditioned.zero_doubtful, (uint32_t)conditioned.peak_Pa_q10};
+      crc, usable, conditioned.tared, conditioned.contact, conditioned.zero_doubtful, (uint32_t)conditioned.peak_Pa_q10};
   memcpy(&words[7], conditioned.pressure_Pa_q10, SENSORS * sizeof words[0]);
   memcpy(&words[7 + SENSORS], condition.past_sd_Pa_q10, SENSORS * sizeof words[0]);
   return crc32_iso_hdlc((const uint8_t *)words, sizeof words);
@@ -70,7 +71,7 @@ static uint32_t with_frame(uint32_t crc) {
 
 static uint32_t course(void) {
   struct condition_gains gains;
-  for (int k = 0; k < FT_MAX_SENSORS; k++) {
+  for (int k = 0; k < 32; k++) {
     gains.inverse_q16[k] = (uint32_t)draw_between(16384, 262144);
   }
   const bool has_gains = ONE_IN(2);

@@ -1,6 +1,6 @@
 /* The fixed-point kernels against the float32 one, which other tests hold to the reference, and all of them on cast
  * rubber: a dip around the contact, sensors off their places and of other widths. Built once for the 3 x 5 grid of the
- * firmware and once for another size. */
+ * firmware and for others. */
 #include "common/contact_flags.h"
 #include "fit/fit.h"
 #include "fit/fit_fixed.h"
@@ -8,12 +8,15 @@
 #include "support/unit.h"
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <string.h>
 
 enum { COLUMNS = TEST_COLUMNS, ROWS = TEST_ROWS, SENSORS = COLUMNS * ROWS };
 #define PITCH_mm 9.0f
-#define ALL (UINT32_MAX >> (32 - SENSORS))
-#define WITHOUT(sensor) (ALL & ~(UINT32_C(1) << (sensor)))
+#define ALL first_sensors(SENSORS)
+#define WITHOUT(sensor) (ALL & ~sensor_bit(sensor))
+/* Of a result, without what pads it. */
+#define RESULT_BYTES (offsetof(struct fit_result, flags) + sizeof(uint32_t))
 #define HALF_X_mm (4.5 * (COLUMNS - 1))
 #define HALF_Y_mm (4.5 * (ROWS - 1))
 
@@ -57,13 +60,13 @@ static struct fit_result by_grid(const struct fit_settings *settings) {
   return result;
 }
 
-static struct fit_result by_masked(uint32_t usable, const struct fit_settings *settings) {
+static struct fit_result by_masked(sensor_map usable, const struct fit_settings *settings) {
   struct fit_result result;
   fit_grid_masked(&array, readings, usable, settings, &result);
   return result;
 }
 
-static struct fit_result by_general(uint32_t usable, const struct fit_settings *settings) {
+static struct fit_result by_general(sensor_map usable, const struct fit_settings *settings) {
   struct fit_result result;
   fit_general(&array, readings, usable, settings, &result);
   return result;
@@ -110,7 +113,7 @@ static void hold_to_the_general_kernel(int presses, int masked) {
   int compared = 0;
   for (int i = 0; i < presses; i++) {
     random_press(4.0, 15.0);
-    uint32_t usable = ALL;
+    sensor_map usable = ALL;
     for (int k = 0; k < masked; k++) {
       usable &= WITHOUT(random_below(&random, SENSORS));
     }
@@ -122,7 +125,7 @@ static void hold_to_the_general_kernel(int presses, int masked) {
     settled.model_sd_q16 = i % 3 ? 400 : 0;
     const struct fit_result grid = masked < 0 ? by_grid(&settled) : by_masked(usable, &settled);
     const struct fit_result general = by_general(usable, &settled);
-    TEST_ASSERT_EQUAL_HEX32(usable, grid.used);
+    TEST_ASSERT_EQUAL_HEX64(usable, grid.used);
     const uint32_t skipped = CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_LOW_SIGNAL | CONTACT_FLAG_ELONGATED;
     if (((general.flags | grid.flags) & skipped) || general.location_sd_mm > 0.2f) {
       continue; /* what is hardly determined may differ, and one alone has shapes */
@@ -136,7 +139,8 @@ static void hold_to_the_general_kernel(int presses, int masked) {
     TEST_ASSERT_FLOAT_WITHIN(0.04f, 1.0f, grid.force_sd_N / general.force_sd_N);
     TEST_ASSERT_FLOAT_WITHIN(3e-4f * general.p0_Pa, general.p0_Pa, grid.p0_Pa);
     TEST_ASSERT_FLOAT_WITHIN(3e-4f * general.sigma_mm, general.sigma_mm, grid.sigma_mm);
-    TEST_ASSERT_FLOAT_WITHIN(0.02f * general.residual_rms_Pa, general.residual_rms_Pa, grid.residual_rms_Pa);
+    /* A micrometre on a steep flank is worth some noise. */
+    TEST_ASSERT_FLOAT_WITHIN((SENSORS > 30 ? 0.07f : 0.02f) * general.residual_rms_Pa, general.residual_rms_Pa, grid.residual_rms_Pa);
   }
   TEST_ASSERT_GREATER_THAN_INT(presses / 3, compared);
 }
@@ -174,7 +178,7 @@ TEST(an_outlier_is_left_out) {
   }
   for (int i = 0; i < 5000; i++) { /* and no sensor of a clean press */
     random_press(4.0, 15.0);
-    TEST_ASSERT_EQUAL_HEX32(ALL, by_gaussian(&usual).used);
+    TEST_ASSERT_EQUAL_HEX64(ALL, by_gaussian(&usual).used);
   }
 }
 
@@ -261,6 +265,15 @@ TEST(a_prior_leaves_what_is_uncertain_so) {
   TEST_ASSERT_GREATER_THAN_INT(500, compared);
 }
 
+/* The sums over all nodes are never larger. */
+TEST(a_press_that_is_alike_everywhere_has_its_peak) {
+  press(1.5, -0.25, 131070.0, 1e6, 0.0);
+  const struct fit_result found[] = {by_grid(&usual), by_masked(ALL, &usual)};
+  for (int each = 0; each < 2; each++) { /* of the widest contact that there is */
+    TEST_ASSERT_FLOAT_WITHIN(15000.0f, 140000.0f, found[each].p0_Pa);
+  }
+}
+
 TEST(readings_below_zero_count_as_zero) {
   const struct fit_settings cut = {.iterations = 4, .noise_Pa_q10 = 5120, .cut_noises = 4};
   struct fit_settings whole = cut;
@@ -279,12 +292,14 @@ TEST(readings_below_zero_count_as_zero) {
         changed++;
       }
     }
-    const struct fit_result expected[] = {by_gaussian(&whole), by_masked(ALL & ~2u, &whole), by_general(ALL, &whole)};
+    const struct fit_result expected[] = {by_gaussian(&whole), by_masked(WITHOUT(1), &whole), by_general(ALL, &whole)};
     memcpy(readings, below, sizeof readings);
-    const struct fit_result found[] = {by_gaussian(&cut), by_masked(ALL & ~2u, &cut), by_general(ALL, &cut)};
-    TEST_ASSERT_EQUAL_MEMORY(expected, found, sizeof found);
+    const struct fit_result found[] = {by_gaussian(&cut), by_masked(WITHOUT(1), &cut), by_general(ALL, &cut)};
+    for (int each = 0; each < 3; each++) {
+      TEST_ASSERT_EQUAL_MEMORY(&expected[each], &found[each], RESULT_BYTES);
+    }
     const struct fit_result other = by_general(ALL, &whole);
-    TEST_ASSERT_EQUAL(changed > 0, memcmp(&expected[2], &other, sizeof other) != 0);
+    TEST_ASSERT_EQUAL(changed > 0, memcmp(&expected[2], &other, RESULT_BYTES) != 0);
   }
 }
 
@@ -394,12 +409,14 @@ TEST(what_is_the_sensors_own_is_taken_out_alike_in_all) {
       own[0].wider_q15 = 3000 * other;
       lacking[other] = by_masked(WITHOUT(0), &settings);
     }
-    TEST_ASSERT_EQUAL_MEMORY(&lacking[0], &lacking[1], sizeof lacking[0]);
+    TEST_ASSERT_EQUAL_MEMORY(&lacking[0], &lacking[1], RESULT_BYTES);
     settings.iterations = 2; /* too few to know the contact before it */
     const struct fit_result early[] = {by_grid(&settings), by_masked(ALL, &settings), by_general(ALL, &settings)};
     settings.own = NULL;
     const struct fit_result without[] = {by_grid(&settings), by_masked(ALL, &settings), by_general(ALL, &settings)};
-    TEST_ASSERT_EQUAL_MEMORY(early, without, sizeof early);
+    for (int each = 0; each < 3; each++) {
+      TEST_ASSERT_EQUAL_MEMORY(&early[each], &without[each], RESULT_BYTES);
+    }
   }
   CHECK(unknown > 0.1f && worst < 0.08f && apart < 0.03f && rough < 40, "off %.3f mm, unknown %.3f, kernels apart %.3f; %d rough",
         (double)worst, (double)unknown, (double)apart, rough);
@@ -434,7 +451,7 @@ TEST(an_outlier_is_found_among_sensors_that_differ) {
     const uint32_t outlier = random_below(&random, SENSORS);
     readings[outlier] += 5000 * 1024;
     const struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = 2048, .own = own};
-    const uint32_t used = by_gaussian(&settings).used;
+    const sensor_map used = by_gaussian(&settings).used;
     found += used == WITHOUT(outlier);
     others += used != ALL && (used >> outlier & 1);
   }

@@ -15,6 +15,7 @@
 
 #define ARRAYS 14
 #define RECTANGLES 7 /* of these */
+#define SENSORS_MOST 32
 
 static const uint32_t always = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_SENSOR_MASKED |
                                CONTACT_FLAG_WIDTHS_VALID | CONTACT_FLAG_ELONGATED;
@@ -72,8 +73,8 @@ static void make_arrays(struct random *random) {
   make_grid(&arrays[12], 4, 1, 6.0f, 0.0f, 0.0f);
   make_grid(&arrays[13], 1, 1, 9.0f, 0.0f, 0.0f);
   make_scattered(random, &arrays[7], 15, 20.0f, 9.0f);
-  make_scattered(random, &arrays[8], FT_MAX_SENSORS, 10000.0f, 0.01f);
-  make_scattered(random, &arrays[9], FT_MAX_SENSORS, 0.001f, 10000.0f);
+  make_scattered(random, &arrays[8], SENSORS_MOST, 10000.0f, 0.01f);
+  make_scattered(random, &arrays[9], SENSORS_MOST, 0.001f, 10000.0f);
   make_scattered(random, &arrays[10], 7, 1e-30f, 1.0f);
   const float same[5] = {1.0f, 1.0f, 1.0f, 1.0f, 1.0f};
   make_array(&arrays[11], 5, same, same, 2.0f);
@@ -118,7 +119,7 @@ static void draw_readings(struct random *random, struct input *input) {
     gaussian(random, input);
     return;
   }
-  for (uint8_t k = 0; k < FT_MAX_SENSORS; k++) {
+  for (uint8_t k = 0; k < SENSORS_MOST; k++) {
     int32_t *p = &input->pressure_Pa_q10[k];
     switch (kind) {
     case 0: *p = any_bits(random); break;
@@ -162,7 +163,7 @@ static struct input draw(uint32_t number, const struct fit_array *on) {
   settings->iterations = (uint8_t)random_below(&random, random_below(&random, 8) ? 8 : 21);
   settings->noise_Pa_q10 = (int32_t)(random_u32(&random) >> (1 + random_below(&random, 31)));
   settings->noise_Pa_q10 += random_below(&random, 32) != 0 && settings->noise_Pa_q10 == 0;
-  for (int k = 0; k < FT_MAX_SENSORS && random_below(&random, 8); k++) { /* of some sensors */
+  for (int k = 0; k < SENSORS_MOST && random_below(&random, 8); k++) { /* of some sensors */
     settings->gain_sd_q16[k] = (uint16_t)(random_u32(&random) >> random_below(&random, 16));
     settings->past_sd_Pa_q10[k] = (int32_t)(random_u32(&random) >> (3 + random_below(&random, 29)));
   }
@@ -175,7 +176,7 @@ static struct input draw(uint32_t number, const struct fit_array *on) {
   }
   if (random_below(&random, 4) == 0) {
     static struct fit_own own[FT_MAX_SENSORS];
-    for (int k = 0; k < FT_MAX_SENSORS; k++) {
+    for (int k = 0; k < SENSORS_MOST; k++) {
       own[k] = (struct fit_own){any_q15(&random), any_q15(&random), any_q15(&random)};
     }
     settings->own = own;
@@ -202,7 +203,7 @@ static bool is_zero(const struct fit_result *result) {
 /* What is wrong with it, or NULL. */
 static const char *complaint(const struct input *input, const struct fit_result *result) {
   const struct fit_array *array = input->array;
-  const uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - array->sensor_count);
+  const uint32_t all = UINT32_MAX >> (SENSORS_MOST - array->sensor_count);
   const float slack = 1e-5f, huge = 1e30f;
   if (input->settings.noise_Pa_q10 < 1) {
     return !(result->flags & CONTACT_FLAG_FIT_VALID) && is_zero(result) ? NULL : "a fit without noise";
@@ -359,8 +360,8 @@ static void condition_any(const struct input *input) {
   struct frame *frame = &tip.frame;
   struct condition_gains gains;
   struct conditioned found;
-  frame->sensor_count = (uint8_t)(1 + below(FT_MAX_SENSORS));
-  const uint32_t all = UINT32_MAX >> (FT_MAX_SENSORS - frame->sensor_count);
+  frame->sensor_count = (uint8_t)(1 + below(SENSORS_MOST));
+  const uint32_t all = UINT32_MAX >> (SENSORS_MOST - frame->sensor_count);
   frame->valid = input->usable & all;
   frame->saturated = below(4) ? 0 : random_u32(&tip.random) & frame->valid;
   frame->doubtful = random_u32(&tip.random) & random_u32(&tip.random) & frame->valid;
@@ -475,7 +476,7 @@ TEST(test_any_bits_of_frames_that_follow_each_other) {
     for (size_t k = 0; k < sizeof calibration; k++) {
       ((uint8_t *)&calibration)[k] = (uint8_t)random_u32(&tip.random);
     }
-    calibration_is_valid(&calibration, FT_MAX_SENSORS);
+    calibration_is_valid(&calibration, SENSORS_MOST);
   }
   printf("%u calls\n", (unsigned)calls);
   TEST_ASSERT_TRUE(estimates > calls / 1000 && shapes > calls / 1000);

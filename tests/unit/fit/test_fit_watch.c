@@ -14,7 +14,7 @@ static void read_with(double offset_Pa) {
   readings[13] += (int32_t)(offset_Pa * 1024.0);
 }
 
-static uint32_t used_of(uint32_t usable) {
+static sensor_map used_of(sensor_map usable) {
   fit_gaussian_follow(&array, readings, usable, &usual, &watch, &result);
   return result.used;
 }

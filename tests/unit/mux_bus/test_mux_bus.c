@@ -60,7 +60,7 @@ static enum ft_status frame(void) {
   return read_back(READ_ADC, 3);
 }
 
-static void expect_readings(uint32_t sensors) {
+static void expect_readings(sensor_map sensors) {
   TEST_ASSERT_EQUAL_HEX32(sensors, result.acknowledged);
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     for (unsigned i = 0; (sensors >> k & 1) != 0 && i < 3; i++) {
@@ -254,7 +254,7 @@ TEST(test_recovery_frees_sda_within_nine_clocks_or_by_the_reset) {
 }
 
 /* Frames and recoveries as scan makes them; returns how many of the frames failed. */
-static int run_for(uint64_t duration_us, uint32_t *sensors) {
+static int run_for(uint64_t duration_us, sensor_map *sensors) {
   int failed = 0;
   const uint64_t until_us = fake.now_us + duration_us;
   while (fake.now_us < until_us) {
@@ -273,7 +273,7 @@ TEST(test_a_line_tied_low_costs_its_multiplexer_only) {
   for (unsigned k = 0; k < BOARD_SENSOR_COUNT; k++) {
     next_case();
     const uint32_t rest = ALL_SENSORS & ~STRIP(k / BOARD_SENSORS_OF_STRIP);
-    uint32_t sensors = 0;
+    sensor_map sensors = 0;
     expect_good_frame();
     fake.tied_low = 1u << k;
     const uint64_t start_us = fake.now_us;
@@ -301,7 +301,7 @@ TEST(test_a_line_tied_low_costs_its_multiplexer_only) {
 }
 
 TEST(test_lines_tied_low_behind_all_multiplexers_leave_nobody) {
-  uint32_t sensors = ALL_SENSORS;
+  sensor_map sensors = ALL_SENSORS;
   fake.tied_low = 1u << 0 | 1u << 7 | 1u << 14;
   TEST_ASSERT_LESS_THAN_INT(60, run_for(10000000, &sensors));
   TEST_ASSERT_EQUAL_HEX32(0, sensors);

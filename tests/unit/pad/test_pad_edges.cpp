@@ -62,7 +62,7 @@ static Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_
   fitting.dip_sd_mm = 15.0F;
   fit_result fit;
   struct fit_tangential found;
-  fit_gaussian_grid(&array, readings.data(), UINT32_MAX >> (FT_MAX_SENSORS - info.sensor_count), &fitting, &fit);
+  fit_gaussian_grid(&array, readings.data(), first_sensors(info.sensor_count), &fitting, &fit);
   fit_tangential_state state{};
   for (int frame = 0; frame < FIT_TANGENTIAL_FRAMES; frame++) {
     fit_tangential_estimate(&array, &prepared, readings.data(), &fitting, &fit, &state, &found);

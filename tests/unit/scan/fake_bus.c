@@ -131,7 +131,7 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
 void fake_bus_init(struct fake_bus *fake, struct array_bus *bus, uint8_t sensor_count) {
   memset(fake, 0, sizeof *fake);
   fake->sensor_count = sensor_count;
-  fake->answering = UINT32_MAX >> (32 - sensor_count);
+  fake->answering = first_sensors(sensor_count);
   fake->fail_at = -1;
   fake->fail_with = FT_ERR_TIMEOUT;
   fake->recovery_is = FT_OK;

@@ -21,7 +21,7 @@ enum { FAKE_LOG = 65536, FAKE_COMMAND_us = 90, FAKE_READ_us = 2900, FAKE_RECOVER
 struct fake_bus {
   /* Set by the test. */
   uint8_t sensor_count;
-  uint32_t answering; /* bitmap */
+  sensor_map answering; /* bitmap */
   struct ms58xx_prom prom[FT_MAX_SENSORS];
   uint32_t d1[FT_MAX_SENSORS], d2[FT_MAX_SENSORS];
   uint32_t misread_prom;      /* bitmap: one bit of word 3 is flipped ... */

@@ -106,7 +106,7 @@ int32_t expected_Pa_q10(uint8_t k) {
   return ms58xx_compensate_pressure(&thermal, fake.d1[k]);
 }
 
-void assert_good_frame(uint32_t valid) {
+void assert_good_frame(sensor_map valid) {
   TEST_ASSERT_EQUAL_HEX32(valid, frame.valid);
   for (uint8_t k = 0; k < SENSORS; k++) {
     TEST_ASSERT_EQUAL_INT32(valid >> k & 1u ? expected_Pa_q10(k) : 0, frame.pressure_Pa_q10[k]);

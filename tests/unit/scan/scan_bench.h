@@ -40,7 +40,7 @@ int assert_admission(int at, int passes);
 int count_entries(uint8_t command, enum fake_operation operation);
 int find_entry(int from, uint8_t command, enum fake_operation operation);
 int32_t expected_Pa_q10(uint8_t k);
-void assert_good_frame(uint32_t valid);
+void assert_good_frame(sensor_map valid);
 
 /* To the middle of the next conversion of the temperature. */
 void skip_to_temperature(void);

@@ -72,7 +72,7 @@ static double true_Pa(int k, uint32_t true_d2) {
   return ms58xx_compensate_pressure(&thermal, d1[k]) / 1024.0;
 }
 
-static void expect(uint32_t valid, uint32_t left_out) {
+static void expect(sensor_map valid, uint32_t left_out) {
   TEST_ASSERT_EQUAL_HEX32(valid, frame.valid);
   TEST_ASSERT_EQUAL_UINT32(left_out, readings.left_out);
 }

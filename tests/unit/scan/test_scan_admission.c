@@ -7,8 +7,8 @@ TEST(test_prom_with_differing_crc_is_used_and_reported) {
   fake.prom[DISTURBED].word[0] ^= 0x3000;
   skip_frames(2);
   assert_entry(assert_admission(0, 3), FAKE_COMMAND, 0x54);
-  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, value_of(&scan.prom_bad));
-  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, scan_read_map(&scan.prom_bad));
+  TEST_ASSERT_EQUAL_HEX32(ALL, scan_read_map(&scan.admitted));
   assert_good_frame(ALL & ~DISTURBED_BIT);
   TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
   run_until(1700000);
@@ -30,9 +30,9 @@ TEST(test_who_did_not_hear_the_reset_is_not_admitted) {
   }
   fake.answering = ALL;
   skip_frames(2);
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.admitted));
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, scan_read_map(&scan.admitted));
   run_until(2000000);
-  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+  TEST_ASSERT_EQUAL_HEX32(ALL, scan_read_map(&scan.admitted));
   TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
 }
 
@@ -41,9 +41,9 @@ TEST(test_prom_misread_in_a_whole_admission_is_read_again) {
   fake.misread_prom = DISTURBED_BIT;
   fake.misread_passes = 3;
   skip_frames(2);
-  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, value_of(&scan.prom_bad));
+  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, scan_read_map(&scan.prom_bad));
   run_until(3000000);
-  TEST_ASSERT_EQUAL_HEX32(0, value_of(&scan.prom_bad));
+  TEST_ASSERT_EQUAL_HEX32(0, scan_read_map(&scan.prom_bad));
   TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
   assert_good_frame(ALL);
   TEST_ASSERT_EQUAL_HEX32(0, frame.doubtful);
@@ -52,8 +52,8 @@ TEST(test_prom_misread_in_a_whole_admission_is_read_again) {
 TEST(test_blank_prom_is_not_admitted_and_asked_ever_more_rarely) {
   memset(&fake.prom[DISTURBED], 0, sizeof fake.prom[DISTURBED]);
   run_until(32000000);
-  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, value_of(&scan.prom_bad));
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.admitted));
+  TEST_ASSERT_EQUAL_HEX32(DISTURBED_BIT, scan_read_map(&scan.prom_bad));
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, scan_read_map(&scan.admitted));
   assert_good_frame(ALL & ~DISTURBED_BIT);
   static const uint64_t intervals_s[] = {1, 2, 4, 8, 8};
   int at = 0;
@@ -69,8 +69,8 @@ TEST(test_blank_prom_is_not_admitted_and_asked_ever_more_rarely) {
   /* Once all are admitted, the next loss is answered after a second again. */
   fake.prom[DISTURBED] = fake.prom[DISTURBED + 1];
   run_until(45000000);
-  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
-  TEST_ASSERT_EQUAL_HEX32(0, value_of(&scan.prom_bad));
+  TEST_ASSERT_EQUAL_HEX32(ALL, scan_read_map(&scan.admitted));
+  TEST_ASSERT_EQUAL_HEX32(0, scan_read_map(&scan.prom_bad));
   assert_good_frame(ALL);
   fake.answering = ALL & ~DISTURBED_BIT;
   skip_frames(2);
@@ -83,7 +83,7 @@ TEST(test_blank_prom_is_not_admitted_and_asked_ever_more_rarely) {
 TEST(test_nobody_answers) {
   fake.answering = 0;
   run_until(25000000);
-  TEST_ASSERT_EQUAL_HEX32(0, value_of(&scan.present));
+  TEST_ASSERT_EQUAL_HEX32(0, scan_read_map(&scan.present));
   TEST_ASSERT_EQUAL_HEX32(0, frame.valid);
   TEST_ASSERT_EQUAL_INT16(0, frame.temperature_cC);
   TEST_ASSERT_GREATER_THAN_UINT32(0, value_of(&scan.counters.bus_nacks));

@@ -45,15 +45,15 @@ TEST(test_what_was_missed_before_a_reset_does_not_count_after_it) {
   fake.zero_next = other;
   next_frame();
   next_frame(); /* the last one before the reset */
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~other, value_of(&scan.admitted));
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~other, scan_read_map(&scan.admitted));
   fake.answering = ALL;
   while (count_entries(0x1E, FAKE_COMMAND) < 2 || scan.state != SCAN_WAIT_CONVERSION) {
     step();
   }
-  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+  TEST_ASSERT_EQUAL_HEX32(ALL, scan_read_map(&scan.admitted));
   fake.answering = ALL & ~DISTURBED_BIT;
   next_frame();
-  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.admitted));
+  TEST_ASSERT_EQUAL_HEX32(ALL, scan_read_map(&scan.admitted));
   fake.answering = ALL;
   skip_frames(5);
   TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
@@ -162,7 +162,7 @@ TEST(test_zero_after_an_acknowledged_command_leads_to_a_reset) {
   run_until(1000000);
   fake.zero_next = DISTURBED_BIT;
   next_frame();
-  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, value_of(&scan.admitted));
+  TEST_ASSERT_EQUAL_HEX32(ALL & ~DISTURBED_BIT, scan_read_map(&scan.admitted));
   skip_frames(2);
   TEST_ASSERT_EQUAL_INT(2, count_entries(0x1E, FAKE_COMMAND));
   assert_good_frame(ALL);
@@ -190,7 +190,7 @@ TEST(test_stuck_bus_is_tried_ever_more_rarely) {
   fake.recovery_is = FT_ERR_STUCK;
   fake.fail_at = 0;
   run_until(now_us + 5000000);
-  TEST_ASSERT_EQUAL_HEX32(0, value_of(&scan.present));
+  TEST_ASSERT_EQUAL_HEX32(0, scan_read_map(&scan.present));
   static const uint64_t delays_ms[] = {10, 20, 40, 80, 160, 320, 640, 1000, 1000};
   int at = find_entry(0, 0, FAKE_RECOVERY);
   for (size_t i = 0; i < sizeof delays_ms / sizeof delays_ms[0]; i++, at++) {
@@ -200,7 +200,7 @@ TEST(test_stuck_bus_is_tried_ever_more_rarely) {
   fake.recovery_is = FT_OK;
   run_until(now_us + 1100000);
   assert_good_frame(ALL);
-  TEST_ASSERT_EQUAL_HEX32(ALL, value_of(&scan.present));
+  TEST_ASSERT_EQUAL_HEX32(ALL, scan_read_map(&scan.present));
   /* Freed once, the next time begins with the short delay. */
   fake.recovery_is = FT_ERR_STUCK;
   fake.fail_at = 0;

@@ -385,13 +385,13 @@ static void forget_places(struct calibration *calibration) {
 /* The firmware before the sensors' places kept 32 of them in slots of 512 bytes. Eight records, as it wrote them: the
  * last counts, and the next goes into the other sector, whenever power is lost. */
 TEST(short_slots_of_the_largest_array_are_read) {
-  enum { SLOT = STORE_SHORT_SLOT_BYTES, LENGTH = LENGTH_OF_3(FT_MAX_SENSORS) };
+  enum { EARLIER_MOST = 32, SLOT = STORE_SHORT_SLOT_BYTES, LENGTH = LENGTH_OF_3(EARLIER_MOST) };
   for (unsigned records = 1; records <= STORE_SLOTS; records++) {
     uint8_t earlier[STORE_SLOTS * SLOT];
     memset(earlier, 0xFF, sizeof earlier);
     struct store_content kept = {0};
     for (unsigned i = 0; i < records; i++) {
-      begin_with(FT_MAX_SENSORS);
+      begin_with(EARLIER_MOST);
       kept.has_calibration = true;
       kept.calibration = some_calibration();
       expect_kept(store_put_calibration(&store, &kept.calibration));
@@ -400,7 +400,7 @@ TEST(short_slots_of_the_largest_array_are_read) {
       memcpy(earlier + i * SLOT, native_flash.bytes, 20 + LENGTH);
       memset(earlier + (i + 1) * SLOT - 8, 0, 8);
     }
-    begin_with(FT_MAX_SENSORS);
+    begin_with(EARLIER_MOST);
     memcpy(native_flash.bytes, earlier, sizeof earlier);
     forget_places(&kept.calibration);
     restart();

@@ -71,12 +71,12 @@ static inline void sample_text(struct sampler *sampler, char text[WIRE_TEXT_BYTE
 
 static inline uint8_t sample_sensor_count(struct sampler *sampler) {
   return sampler->kind == SAMPLE_RANDOM     ? (uint8_t)(1 + random_below(&sampler->random, 32))
-         : sampler->kind == SAMPLE_GREATEST ? FT_MAX_SENSORS
+         : sampler->kind == SAMPLE_GREATEST ? WIRE_SENSORS_OF_WORD
                                             : 1;
 }
 
 /* The kinds of fields, and runs of them: as packet.c has them. */
-enum kind { BYTES, TEXTS, SENSOR_COUNT, U16, U32, U64, F32, PAIRS, F32_PAIRS, SENSORS_F32, SENSORS_U16, WHEN };
+enum kind { BYTES, TEXTS, SENSOR_COUNT, U16, U32, U64, F32, PAIRS, F32_PAIRS, SENSORS_F32, SENSORS_U16, WHEN, MAP };
 struct run {
   uint8_t kind, count;
   uint16_t offset;
@@ -112,7 +112,8 @@ static inline struct walk walk_begin(struct wire_packet *packet) {
 
 static inline bool walk_on(struct walk *walk, struct value *value) {
   static const uint8_t bytes[] = {1, WIRE_TEXT_BYTES, 1, 2, 4, 8, 4};
-  static const enum kind kinds[] = {BYTES, TEXTS, SENSOR_COUNT, U16, U32, U64, F32, U32, F32, F32, U16};
+  /* A map as in a packet that is not wide. */
+  static const enum kind kinds[] = {BYTES, TEXTS, SENSOR_COUNT, U16, U32, U64, F32, U32, F32, F32, U16, BYTES, U32};
   while (walk->run != walk->end) {
     const struct run *run = walk->run;
     uint8_t *field = (uint8_t *)walk->packet + run->offset;
@@ -124,7 +125,7 @@ static inline bool walk_on(struct walk *walk, struct value *value) {
     }
     const bool pairs = run->kind == PAIRS || run->kind == F32_PAIRS;
     const unsigned each = pairs ? 2 : run->count, sensor = walk->next / each, at = walk->next % each;
-    if (walk->next == each * (run->kind >= PAIRS ? *walk->sensors : 1u)) {
+    if (walk->next == each * (run->kind >= PAIRS && run->kind < WHEN ? *walk->sensors : 1u)) {
       walk->next = 0;
       walk->run++;
       continue;

@@ -38,7 +38,7 @@ struct normal {
   real rhs[PARAMETERS];
 };
 
-static bool normalise(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, struct samples *samples) {
+static bool normalise(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, struct samples *samples) {
   int32_t largest = 0;
   samples->count = 0;
   for (int k = 0; k < array->sensor_count; k++) {
@@ -204,7 +204,7 @@ static void lm(const struct samples *samples, int iterations, real theta[PARAMET
   }
 }
 
-static struct alternative_fit fitted(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, int iterations,
+static struct alternative_fit fitted(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, int iterations,
                                      void (*iterate)(const struct samples *samples, int iterations, real *theta)) {
   struct samples samples;
   real theta[PARAMETERS], pitch_mm = (real)array->pitch_mm;

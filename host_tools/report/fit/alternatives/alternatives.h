@@ -18,7 +18,7 @@ struct alternative_fit {
   double x_mm, y_mm, p0_Pa, sigma_mm;
 };
 #define ALTERNATIVE(name)                                                                                                                  \
-  struct alternative_fit name(const struct fit_array *array, const int32_t *pressure_Pa_q10, uint32_t usable, int iterations)
+  struct alternative_fit name(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, int iterations)
 ALTERNATIVE(alternative_naive_float);
 ALTERNATIVE(alternative_naive_double);
 ALTERNATIVE(alternative_lm_float);

@@ -50,7 +50,7 @@ public:
                       },
                       nullptr};
     for (std::size_t k = 0; k < SENSORS; k++) {
-      settings.absent |= pad.is_absent(k) ? 1u << k : 0u;
+      settings.absent |= pad.is_absent(k) ? sensor_bit(static_cast<unsigned>(k)) : 0;
     }
     native_fingertip_start(&settings);
     native_cdc_open();

@@ -55,22 +55,13 @@ export function execute(core, stop, time) {
           r[op & 7] = negative;
           break;
         }
-        case 1: {
-          // LSRS immediate
-          const shift = (op >>> 6) & 31;
-          const value = r[(op >>> 3) & 7];
-          carry = (value >>> (shift ? shift - 1 : 31)) & 1;
-          negative = shift ? (value >>> shift) | 0 : 0;
-          zero = negative;
-          r[op & 7] = negative;
-          break;
-        }
+        case 1:
         case 2: {
-          // ASRS immediate
+          // LSRS, ASRS immediate
           const shift = (op >>> 6) & 31;
           const value = r[(op >>> 3) & 7];
           carry = (value >>> (shift ? shift - 1 : 31)) & 1;
-          negative = value >> (shift || 31);
+          negative = op & 0x1000 ? value >> (shift || 31) : shift ? (value >>> shift) | 0 : 0;
           zero = negative;
           r[op & 7] = negative;
           break;
@@ -94,20 +85,10 @@ export function execute(core, stop, time) {
           zero = negative;
           r[(op >>> 8) & 7] = negative;
           break;
-        case 5: {
-          // CMP
-          const a = r[(op >>> 8) & 7];
-          const b = ~(op & 0xff);
-          const result = (a + b + 1) | 0;
-          carry = ((a & b) | ((a | b) & ~result)) >>> 31;
-          overflow = (a ^ result) & (b ^ result);
-          negative = result;
-          zero = result;
-          break;
-        }
+        case 5:
         case 6:
         case 7: {
-          // ADDS, SUBS 8-bit immediate
+          // CMP, ADDS, SUBS 8-bit immediate
           const d = (op >>> 8) & 7;
           const a = r[d];
           const b = op & 0x800 ? ~(op & 0xff) : op & 0xff;
@@ -116,7 +97,7 @@ export function execute(core, stop, time) {
           overflow = (a ^ result) & (b ^ result);
           negative = result;
           zero = result;
-          r[d] = result;
+          if (op & 0x1000) r[d] = result;
           break;
         }
         case 8: {

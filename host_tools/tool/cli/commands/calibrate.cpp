@@ -95,7 +95,7 @@ public:
 
   /* Throws Error where a sensor does not answer. */
   void check_sensors() {
-    const std::uint32_t missing = missing_sensors(session_.health().body.health.sensors_present, info_.sensor_count);
+    const sensor_map missing = missing_sensors(session_.health().body.health.sensors_present, info_.sensor_count);
     if (missing) {
       throw Error(name() + ": sensors do not answer: " + sensors_text(missing) +
                   "; mend their wiring first, a calibration is of all of them");

@@ -292,7 +292,7 @@ private:
     }
     std::vector<std::string> notes = {message_.text()};
     for (std::size_t i = 0; i < models_.size(); i++) {
-      std::uint32_t missing = models_[i].missing_sensors();
+      sensor_map missing = models_[i].missing_sensors();
       notes.push_back(missing ? name_of(i) + "sensors missing: " + sensors_text(missing) : "");
     }
     if (const RecordingWriter *recording = joint_recording(); recording && !options_.monitor) {
@@ -305,7 +305,7 @@ private:
 
   /* For programs and log files: once, and when it changes. */
   void report_missing(std::size_t device) {
-    std::uint32_t missing = models_[device].missing_sensors();
+    sensor_map missing = models_[device].missing_sensors();
     if (options_.monitor || missing == reported_missing_[device]) {
       return;
     }
@@ -366,7 +366,7 @@ private:
   Message message_;
   Confirmation tare_;
   std::vector<bool> taring_, accepted_; /* asked for, and not refused; under way */
-  std::vector<std::uint32_t> reported_missing_;
+  std::vector<sensor_map> reported_missing_;
   std::string reason_;
   std::int64_t zero_us_ = 0;
   std::size_t running_ = 0;

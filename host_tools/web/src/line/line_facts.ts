@@ -274,7 +274,7 @@ export interface Raw extends Header {
   doubtful: number;
   /** mean of the sensors, 0.01 degC; 0 until measured */
   temperature_cC: number;
-  /** number of sensors, 1 to 32 */
+  /** number of sensors, 1 to 36 */
   sensor_count: number;
   /** of each sensor: absolute pressure, and the zero, of which the fit subtracts what has not faded in this contact; both in 1/1024 Pa */
   pressure_Pa_q10: Float64Array;
@@ -286,7 +286,7 @@ export interface Info extends Header {
   type: 0x03;
   /** major, minor, patch */
   firmware_version: Float64Array;
-  /** number of sensors, 1 to 32 */
+  /** number of sensors, 1 to 36 */
   sensor_count: number;
   /** what the firmware can do, see below */
   capabilities: number;

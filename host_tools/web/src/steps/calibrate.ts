@@ -33,7 +33,8 @@ function forceOf(grams: string): number | null {
 
 async function checkSensors(fingertip: Fingertip): Promise<void> {
   const { sensors_present } = await fingertip.askHealth();
-  const missing = sensorsOf(~sensors_present, fingertip.info?.sensor_count ?? 0);
+  const count = fingertip.info?.sensor_count ?? 0;
+  const missing = sensorsOf(2 ** count - 1 - sensors_present, count);
   if (missing.length > 0) {
     throw new Error(`sensors do not answer: ${missing.join(' ')}; mend their wiring first, a calibration is of all of them`);
   }

@@ -1,6 +1,7 @@
 /** Lines of the health panel out of what a fingertip and its line count. */
 import { Flag, Stored } from '../line/line_facts';
 import { capabilitiesText, storedText } from '../core';
+import { hasSensor } from '../model/history';
 import type { Level, Shown } from './shown';
 
 export interface Fact {
@@ -72,7 +73,7 @@ function sensorFacts({ fingertip, readings }: Shown, count: number): Fact[] {
     facts.push(fact('answer', `${answering} of ${count}`, answering < count ? 'bad' : 'good'));
     facts.push(fact('in doubt', doubtful || 'none', doubtful ? 'warning' : 'plain'));
     if (readings && readings.valid !== 2 ** count - 1) {
-      facts.push(fact('without reading', sensorsOf(~readings.valid, count).join(', '), 'bad'));
+      facts.push(fact('without reading', sensorsOf(2 ** count - 1 - readings.valid, count).join(', '), 'bad'));
     }
     facts.push(fact('temperature', raw.temperature_cC ? `${(raw.temperature_cC / 100).toFixed(1)} °C` : '–'));
   }
@@ -125,7 +126,7 @@ function firmwareFacts({ fingertip }: Shown, info: NonNullable<Shown['fingertip'
 
 /** The sensors in a bitmap. */
 export function sensorsOf(map: number, count: number): number[] {
-  return Array.from({ length: count }, (_, k) => k).filter((k) => (map >>> k) & 1);
+  return Array.from({ length: count }, (_, k) => k).filter((k) => hasSensor(map, k));
 }
 
 function duration(seconds: number): string {

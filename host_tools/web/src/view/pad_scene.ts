@@ -2,7 +2,7 @@
 import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import type { Found } from '../model/fingertip';
-import type { Readings } from '../model/history';
+import { hasSensor, type Readings } from '../model/history';
 import type { ShownContact, ShownLayout } from './shown';
 
 /** Rim of the pad beyond the outermost sensors. */
@@ -81,7 +81,7 @@ export function sceneOf(
   found: Found | null = null,
 ): Scene {
   const count = layout.x_mm.length;
-  const has = (bits: number | undefined, k: number) => ((bits ?? 0) >>> k) % 2 === 1;
+  const has = (map: number | undefined, k: number) => hasSensor(map ?? 0, k);
   const known = current ? readings : null;
   const tared = contact === null || (contact.flags & Flag.TARED) !== 0;
   const sensors = Array.from({ length: count }, (_, k) => k);
