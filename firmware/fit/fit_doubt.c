@@ -175,31 +175,6 @@ static NOINLINE int32_t normalise(struct fit_doubt_search *look, int u, int32_t 
   return own;
 }
 
-static NOINLINE void put_products(int a, const int32_t *sums, struct fit_doubt_search *look) {
-  const int8_t *up = look->up;
-  for (int k = 0, b = a; k < 3; k++) {
-    b = b == UNKNOWNS - 1 ? 0 : b + 1;
-    look->matrix[a > b ? a : b][a > b ? b : a] = sums[k] * (1 << (up[a] + up[b]));
-  }
-  look->right[a] = sums[3] * (1 << up[a]);
-}
-
-_Static_assert(UNKNOWNS == 7, "every pair is in one of these");
-#define TAKE_PRODUCTS(a)                                                                                                                   \
-  static NOINLINE void take_products_##a(struct fit_doubt_search *look) {                                                                  \
-    int32_t sums[4];                                                                                                                       \
-    const int32_t *row = look->row[0];                                                                                                     \
-    fixed_sum_products(row, row + look->count * WORDS, sums, WORDS, (a), ((a) + 1) % 7, ((a) + 2) % 7, ((a) + 3) % 7);                     \
-    put_products((a), sums, look);                                                                                                         \
-  }
-TAKE_PRODUCTS(0)
-TAKE_PRODUCTS(1)
-TAKE_PRODUCTS(2)
-TAKE_PRODUCTS(3)
-TAKE_PRODUCTS(4)
-TAKE_PRODUCTS(5)
-TAKE_PRODUCTS(6)
-
 /* Columns in the room that the sums have, and the diagonal 2^28 .. 2^30. */
 static void scale_columns(struct fit_doubt_search *look) {
   int32_t prior_q30 = fit_scaled_to_fixed(scaled_mul(look->base, fit_scaled_from(FAR_PER_SD, 0)), 30);
@@ -213,21 +188,18 @@ static void scale_columns(struct fit_doubt_search *look) {
   look->residual_square = normalise(look, RESIDUAL, 0);
 }
 
+_Static_assert(UNKNOWNS == FIT_PRODUCTS && RESIDUAL == FIT_PRODUCTS, "as the sums have them");
 static void take_products(struct fit_doubt_search *look) {
-  take_products_0(look);
-  take_products_1(look);
-  take_products_2(look);
-  take_products_3(look);
-  take_products_4(look);
-  take_products_5(look);
-  take_products_6(look);
-}
-
-/* What the unknown explains of the square of the residual. */
-static NOINLINE int32_t eliminate(struct fit_doubt_search *look, int j) {
-  int32_t over[UNKNOWNS];
-  struct fixed_pivot pivot = fixed_eliminate(look->matrix[0], UNKNOWNS, UNKNOWNS, j, look->right, over);
-  return pivot.own * pivot.over * 2;
+  const int8_t *up = look->up;
+  for (int a = 0; a < UNKNOWNS; a++) {
+    int32_t sums[4];
+    fit_sum_products[a](look->row[0], look->row[look->count], sums);
+    for (int k = 0, b = a; k < 3; k++) {
+      b = b == UNKNOWNS - 1 ? 0 : b + 1;
+      look->matrix[a > b ? a : b][a > b ? b : a] = sums[k] * (1 << (up[a] + up[b]));
+    }
+    look->right[a] = sums[3] * (1 << up[a]);
+  }
 }
 
 /* The square of the trace's coefficients beyond what they are by chance, 0 where there is none. */
@@ -235,7 +207,9 @@ static NOINLINE struct scaled trace_of(struct fit_doubt_search *look) {
   const struct scaled none = {0, 0};
   int32_t left = look->residual_square;
   for (int j = 0; j < UNKNOWNS; j++) {
-    left -= eliminate(look, j);
+    int32_t over[UNKNOWNS];
+    const struct fixed_pivot pivot = fixed_eliminate(look->matrix[0], UNKNOWNS, UNKNOWNS, j, look->right, over);
+    left -= pivot.own * pivot.over * 2; /* what the unknown explains */
   }
   if (look->matrix[PULL_X][PULL_X] < FIXED_PIVOT_LEAST || look->matrix[PULL_Y][PULL_Y] < FIXED_PIVOT_LEAST) {
     return none;

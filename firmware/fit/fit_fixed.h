@@ -83,24 +83,6 @@ FIXED_INLINE int32_t fixed_longer_leg(int32_t a, int32_t b) {
   return longer + ((3 * shorter) >> 3);
 }
 
-/* The products of element a of each row of `words` with elements b, c, d and the last, summed: four
- * in as many registers as a Cortex-M0+ has for them. */
-FIXED_INLINE void fixed_sum_products(const int32_t *row, const int32_t *end, int32_t *sums, int words, int a, int b, int c, int d) {
-  int32_t ab = 0, ac = 0, ad = 0, al = 0;
-  do {
-    int32_t own = row[a];
-    ab += row[b] * own;
-    ac += row[c] * own;
-    ad += row[d] * own;
-    al += row[words - 1] * own;
-    row += words;
-  } while (row != end);
-  sums[0] = ab;
-  sums[1] = ac;
-  sums[2] = ad;
-  sums[3] = al;
-}
-
 /* What is left of unknown j of a least squares once those before have been taken from it; of no
  * use below FIXED_PIVOT_LEAST, where the readings do not separate it from them. */
 struct fixed_pivot {

@@ -695,9 +695,7 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
       const int32_t peak_q28 = fit_grid_peak(system.amplitude_q28, system.rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
       fit_grid_take_own_out(array, settings, usable, &state, peak_q28, &readings);
     }
-    system.at.x = state.x;
-    system.at.y = state.y;
-    system.at.height = state.height;
+    system.at = state;
     evaluate(&readings, left <= 1 ? LAST : coarse ? COARSE : FINE, &columns, &system);
     fit_grid_step(grid, &system, &state);
     if (left == 0) { /* the guess is asked for: the step only shows how good it is */

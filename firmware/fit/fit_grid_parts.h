@@ -169,6 +169,10 @@ FIXED_INLINE bool fit_is_another(int32_t sum_q20, int32_t before_q20) {
 /* Readings below zero as they are, where fit_grid_take_readings took them as zero. */
 void fit_grid_take_below_zero(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, struct readings *readings);
 
+/* Sums over the rows to the end, of FIT_PRODUCTS + 1 each: the products of element a with the three after it in turn, and with the last. */
+#define FIT_PRODUCTS 7
+extern void (*const fit_sum_products[FIT_PRODUCTS])(const int32_t *row, const int32_t *end, int32_t *sums);
+
 /* value >= 0 and finite. */
 uint64_t fit_packed_float(float value);
 FIXED_INLINE struct scaled fit_grid_scaled(float value) { return scaled_unpack(fit_packed_float(value)); }

@@ -104,11 +104,27 @@ NOINLINE static void normalise_column(struct fit_tangential_room *room, int u, i
   room->matrix[u][u] = own * (1 << (2 * scale));
 }
 
-/* Every pair of the first seven unknowns is a, a + 1, a + 2 or a + 3 modulo 7 of one a. */
-_Static_assert(UNKNOWNS == 8, "every pair is in one of these");
+/* Four sums in as many registers as a Cortex-M0+ has for them. */
+FIXED_INLINE void sum_products(const int32_t *row, const int32_t *end, int32_t *sums, int a, int b, int c, int d) {
+  int32_t ab = 0, ac = 0, ad = 0, al = 0;
+  do {
+    int32_t own = row[a];
+    ab += row[b] * own;
+    ac += row[c] * own;
+    ad += row[d] * own;
+    al += row[UNKNOWNS - 1] * own;
+    row += UNKNOWNS;
+  } while (row != end);
+  sums[0] = ab;
+  sums[1] = ac;
+  sums[2] = ad;
+  sums[3] = al;
+}
+
+_Static_assert(UNKNOWNS == FIT_PRODUCTS + 1, "every pair of all but the last is in one of these");
 #define SUM_PRODUCTS(a)                                                                                                                    \
-  NOINLINE static void sum_products_##a(const int32_t *column, int32_t *sums) {                                                            \
-    fixed_sum_products(column, column + NODES * UNKNOWNS, sums, UNKNOWNS, (a), ((a) + 1) % 7, ((a) + 2) % 7, ((a) + 3) % 7);               \
+  NOINLINE static void sum_products_##a(const int32_t *row, const int32_t *end, int32_t *sums) {                                           \
+    sum_products(row, end, sums, (a), ((a) + 1) % FIT_PRODUCTS, ((a) + 2) % FIT_PRODUCTS, ((a) + 3) % FIT_PRODUCTS);                       \
   }
 SUM_PRODUCTS(0)
 SUM_PRODUCTS(1)
@@ -117,13 +133,14 @@ SUM_PRODUCTS(3)
 SUM_PRODUCTS(4)
 SUM_PRODUCTS(5)
 SUM_PRODUCTS(6)
+void (*const fit_sum_products[FIT_PRODUCTS])(const int32_t *, const int32_t *, int32_t *) = {
+    sum_products_0, sum_products_1, sum_products_2, sum_products_3, sum_products_4, sum_products_5, sum_products_6};
 
 static void form(struct fit_tangential_room *room, const int32_t *scale) {
-  static void (*const sum[UNKNOWNS - 1])(const int32_t *, int32_t *) = {sum_products_0, sum_products_1, sum_products_2, sum_products_3,
-                                                                        sum_products_4, sum_products_5, sum_products_6};
+  const int32_t *row = room->node[0].column;
   for (int a = 0; a < UNKNOWNS - 1; a++) {
     int32_t sums[4];
-    sum[a](room->node[0].column, sums);
+    fit_sum_products[a](row, row + NODES * UNKNOWNS, sums);
     int32_t up = scale[a];
     for (int k = 0, b = a; k < 3; k++) {
       b = b == UNKNOWNS - 2 ? 0 : b + 1;
