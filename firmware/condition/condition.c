@@ -147,7 +147,7 @@ static int32_t taken_into_zeros(const struct condition *condition, sensor_map us
 static void begin_contact(struct condition *condition, const struct conditioned *conditioned, uint8_t count) {
   for (uint8_t k = 0; k < count; k++) {
     update_compare(condition, k, clamped_difference(conditioned->pressure_Pa_q10[k], condition->faded_Pa_q10[k]));
-    condition->sensor[k].reached_Pa_q10 = 0;
+    condition->sensor[k].reached_Pa_q10 = condition->sensor[k].let_go_Pa_q10 = 0;
     condition->margin_Pa_q10[k] = 0;
   }
   /* What the zeros took of this contact itself, while it was within the band, counts twice: where it then moves they are off as before. */

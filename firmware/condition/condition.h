@@ -30,7 +30,9 @@
  * to rest: where it was before, within PAST_SDS of what may be kept.
  * - Its amount is uncertain, and so is what a hold itself changes in this sensor alone. past_sd_Pa_q10 is the sd of
  * both: a share of what the sensor has measured, which rises in a hold and by all that it lets go of, after a contact
- * or where one moves on, and fades with PAST_ms. The share is learnt from what is left after each contact.
+ * or where one moves on, and fades with PAST_ms. The share is learnt from what is left after each contact, as a size and with its sign.
+ * - Where a contact moves on, that share with its sign of what a sensor lets go of is taken off its pressure. The gate does not know of it:
+ * there it would hide a force.
  *
  * The level of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
  * is taken again if it was taken in the five seconds before its sensor was reset as it had lost its state, or stepped
@@ -74,6 +76,9 @@ struct condition_sensor {
   int32_t reached_Pa_q10; /* the same of this contact alone */
   int32_t past_Pa_q10;    /* what rubber may keep: rises in a hold, and by all that is let go; fades in 3 s */
   int32_t past_share;     /* sd of that, 1 / 2^16: learnt from what is left after contacts */
+  int32_t keeps_share;    /* mean, of either sign, learnt likewise */
+  int32_t let_go_Pa_q10;  /* suddenly in this contact, fading: as where it slides on */
+  int32_t kept_Pa_q10;    /* of that */
   int32_t wander_Pa_q10;
   int32_t taken_Pa_q10;
   int32_t crept_Pa_q10;   /* risen slowly */
@@ -117,7 +122,7 @@ struct condition {
   struct calm calm;
 
   int32_t zero_Pa_q10[FT_MAX_SENSORS];    /* [sensor] 1/1024 Pa, as all here: level + remainder */
-  int32_t faded_Pa_q10[FT_MAX_SENSORS];   /* of the remainder, in this contact */
+  int32_t faded_Pa_q10[FT_MAX_SENSORS];   /* of the remainder, in this contact, less what the rubber has kept of it */
   int32_t margin_Pa_q10[FT_MAX_SENSORS];  /* by which the gate is higher */
   int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* of a reading: what a press before and this hold leave in it */
   int32_t sum_Pa_q10[FT_MAX_SENSORS];     /* of readings above the zero, since the last update */

@@ -65,6 +65,8 @@
 #define PAST_LEAST_Pa 1000                /* less shows nothing beside noise and drift */
 #define PAST_SDS 2                        /* the zero is within as many of where it comes to rest; twin, seeds 21 to 24 */
 #define PAST_LEARN_SHIFT 2                /* a quarter of what each release shows; choice */
+#define KEEPS_LEARN_SHIFT 1               /* and a half of its mean; twin, seeds 101 to 110 */
+#define SUDDEN_SHIFT 6                    /* a fall by a 64th of the press between two updates is the contact's, not the rubber's */
 #define CROSS_SHIFT 2                     /* all but a quarter of the strongest memory counts for all; strips, ZERO.md */
 #define FRESH_ms ((uint32_t)SECONDS(2))   /* after a contact: a remainder may rise */
 #define REMAINDER_ms MS(700)              /* time constant of a remainder; strips: 0.5 s at least */

@@ -14,7 +14,7 @@ struct step {
   int32_t reading_Pa_q10; /* absolute */
   int32_t steady_Pa_q10;  /* above the zero, but for one disturbed reading */
   int32_t slow_Pa_q10;    /* the reading above its low pass */
-  int32_t fell_Pa_q10;    /* since the last update */
+  int32_t fell_Pa_q10;    /* since the last update; below 0: rose */
   int32_t above_Pa_q10;   /* above the zero: mean of the readings since the last update */
   bool moves;             /* the reading moved as in a press or a release */
 };
@@ -52,6 +52,8 @@ static void follow_past(const struct step *step) {
   if (step->condition->gate.pressed) { /* what a sensor lets go of in a contact that moves, as after one */
     const int32_t with_it = sensor->past_Pa_q10 + step->fell_Pa_q10;
     sensor->past_Pa_q10 = larger(sensor->past_Pa_q10, clamp(with_it, 0, sensor->reached_Pa_q10));
+    const int32_t fell = size_of(step->fell_Pa_q10) > sensor->reached_Pa_q10 >> SUDDEN_SHIFT ? step->fell_Pa_q10 : 0;
+    sensor->let_go_Pa_q10 = clamp(faded(sensor->let_go_Pa_q10, share_in(step->ms, PAST_ms)) + fell, 0, Pa_q10(SATURATED_Pa));
   }
   step->condition->past_sd_Pa_q10[step->k] = part_of(sensor->past_Pa_q10, sensor->past_share);
 }
@@ -86,6 +88,8 @@ static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
     const int32_t off = clamp(size_of(above_level_Pa_q10) - step->condition->drifted_Pa_q10, 0, most);
     const int32_t shown = port_divide(off + off / 4, sensor->past_Pa_q10 >> 16);
     sensor->past_share = larger(sensor->past_share + ((shown - sensor->past_share) >> PAST_LEARN_SHIFT), PAST_SHARE_LEAST);
+    const int32_t keeps = clamp(above_level_Pa_q10 + sensor->level_Pa_q10 - sensor->rests_Pa_q10, -most, most);
+    sensor->keeps_share += (port_divide(keeps, sensor->past_Pa_q10 >> 16) - sensor->keeps_share) >> KEEPS_LEARN_SHIFT;
   }
 }
 
@@ -131,7 +135,7 @@ void update_begin_tare(struct condition *condition, uint8_t k, int32_t spread_Pa
   sensor->memory_Pa_q10 = sensor->reached_Pa_q10 = 0;
   forget_past(sensor);
   sensor->wander_Pa_q10 = sensor->taken_Pa_q10 = sensor->crept_Pa_q10 = 0;
-  condition->faded_Pa_q10[k] = condition->margin_Pa_q10[k] = 0;
+  condition->faded_Pa_q10[k] = condition->margin_Pa_q10[k] = sensor->kept_Pa_q10 = sensor->let_go_Pa_q10 = 0;
   condition->sum_Pa_q10[k] = 0;
   condition->summed[k] = 0;
   condition->taring |= sensor_bit(k);
@@ -209,9 +213,11 @@ static void hold(const struct step *step) {
     condition->zero_Pa_q10[step->k] += drifted;
   }
   const int32_t remainder = condition->zero_Pa_q10[step->k] - sensor->rests_Pa_q10;
-  int32_t *gone = &condition->faded_Pa_q10[step->k];
-  *gone += part_of(remainder - *gone, share_in(step->ms, PAST_ms));
-  condition->margin_Pa_q10[step->k] += *gone;
+  int32_t *off = &condition->faded_Pa_q10[step->k];
+  const int32_t gone = *off + sensor->kept_Pa_q10;
+  sensor->kept_Pa_q10 = (sensor->let_go_Pa_q10 >> 10) * sensor->keeps_share >> 6;
+  *off = gone + part_of(remainder - gone, share_in(step->ms, PAST_ms)) - sensor->kept_Pa_q10;
+  condition->margin_Pa_q10[step->k] += *off;
 }
 
 /* The zero is what level and remainder are now: what it may be off by grows by what they have moved. */
@@ -320,7 +326,7 @@ static void follow(const struct step *step) {
   struct condition *condition = step->condition;
   struct condition_sensor *sensor = step->sensor;
   const bool unsure = condition->unsure;
-  condition->faded_Pa_q10[step->k] = 0;
+  condition->faded_Pa_q10[step->k] = sensor->kept_Pa_q10 = 0;
   if (!unsure && settle(step)) {
     return;
   }
@@ -342,10 +348,9 @@ static void follow(const struct step *step) {
 }
 
 /* Whether the reading moved since the last update as in a press or a release, and not as a remainder. */
-static bool moves(const struct step *step, int32_t before_Pa_q10, int32_t above_Pa_q10) {
-  const int32_t rise = clamp(clamped_difference(step->reading_Pa_q10, before_Pa_q10), -PRESSURE_MAX, PRESSURE_MAX);
+static bool moves(const struct step *step, int32_t above_Pa_q10) {
   const int32_t still = STILL_SIGMA * step->noise_Pa_q10;
-  return rise > still || rise < -still - (larger(above_Pa_q10, 0) >> FALL_SHIFT);
+  return step->fell_Pa_q10 < -still || step->fell_Pa_q10 > still + (larger(above_Pa_q10, 0) >> FALL_SHIFT);
 }
 
 void update_sensor(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned, uint8_t k) {
@@ -380,7 +385,7 @@ void update_sensor(struct condition *condition, const struct frame *frame, const
       .wander_share = share_in(ms, WANDER_ms),
       .noise_Pa_q10 = frame->noise_Pa_q10,
       .reading_Pa_q10 = reading,
-      .fell_Pa_q10 = clamp(clamped_difference(before, reading), 0, PRESSURE_MAX),
+      .fell_Pa_q10 = clamp(clamped_difference(before, reading), -PRESSURE_MAX, PRESSURE_MAX),
       .steady_Pa_q10 = clamped_difference(reading < before ? reading : before, zero),
       .slow_Pa_q10 = slow,
       .above_Pa_q10 = take_mean(condition, k, above),
@@ -390,7 +395,7 @@ void update_sensor(struct condition *condition, const struct frame *frame, const
   if (condition->gate.pressed && !condition->unsure) {
     hold(&step);
   } else {
-    step.moves = moves(&step, before, above);
+    step.moves = moves(&step, above);
     follow(&step);
   }
 }

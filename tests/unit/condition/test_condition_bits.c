@@ -97,8 +97,8 @@ static uint32_t course(void) {
 }
 
 TEST(test_frames_are_conditioned_the_same_to_the_bit) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x83DC13A4, 0x3AE0ABE5, 0x1DB2B19B, 0x5402C885,
-                                                 0xD872214B, 0xC9BC7BFA, 0x51B77541, 0x99F331DA};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x02BC95EE, 0x722A4184, 0xA3C3BD4D, 0x53A58813,
+                                                 0x7FAB7241, 0x22E5EC63, 0xED3B939C, 0x599C2152};
   uint32_t found[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x7A65726F));
   for (int i = 0; i < COURSES; i++) {

@@ -229,6 +229,25 @@ TEST(test_what_a_sensor_keeps_shows_after_the_press_alone) {
   }
 }
 
+/* What it keeps where a contact moves on, sensor 7 has shown after the presses before: its pressure is right all the time. */
+TEST(test_what_a_sensor_keeps_where_a_contact_moves_on_is_known) {
+  for (size_t i = 0; i < FAST_PERIODS; i++) {
+    for (int sign = -1; sign <= 1; sign += 2) {
+      const float share = 0.04f * (float)sign;
+      begin_calm(periods_us[i]);
+      keep(6, share, 3, 10);
+      hold(20000 * Pa, 1);
+      for (int tenth = 0; tenth < 20; tenth++) {
+        fill(AMBIENT);
+        frame.pressure_Pa_q10[1] += 20000 * Pa;
+        frame.pressure_Pa_q10[7] += (int32_t)(20000.0f * share * expf(-0.1f / 3.0f * (float)tenth)) * Pa;
+        run_s(0.1f);
+        TEST_ASSERT_INT32_WITHIN((tenth < 1 ? 1000 : 150) * Pa, 0, conditioned.pressure_Pa_q10[7]);
+      }
+    }
+  }
+}
+
 /* The sd of what rubber keeps: of a hold as it grows, of all that is let go, and then less in 3 s. A sensor that stood
  * off by a tenth counts for more from then on, one that did not for less. */
 TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
