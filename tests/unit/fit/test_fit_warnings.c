@@ -2,15 +2,19 @@
 
 #include <string.h>
 
+static uint32_t flags_of_equal(int32_t reading) {
+  for (int k = 0; k < SENSORS; k++) {
+    readings[k] = reading;
+  }
+  fit_gaussian(&array, readings, ALL, &usual, &result);
+  assert_finite_and_defined();
+  return result.flags;
+}
+
 TEST(test_equal_readings_are_flat) {
   static const int32_t levels[] = {1024, 100 * 1024, 10000 * 1024, INT32_MAX};
   for (size_t i = 0; i < 4; i++) {
-    for (int k = 0; k < SENSORS; k++) {
-      readings[k] = levels[i];
-    }
-    fit_gaussian(&array, readings, ALL, &usual, &result);
-    assert_finite_and_defined();
-    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_FLAT, result.flags);
+    TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_FLAT, flags_of_equal(levels[i]));
   }
   struct press wide = {0.0, 0.0, 5000.0, 60.0};
   read_press(&wide, 0.0, NULL);
@@ -21,12 +25,7 @@ TEST(test_equal_readings_are_flat) {
 TEST(test_nothing_positive_is_no_fit) {
   static const int32_t levels[] = {0, -1, -1024, INT32_MIN};
   for (size_t i = 0; i < 4; i++) {
-    for (int k = 0; k < SENSORS; k++) {
-      readings[k] = levels[i];
-    }
-    fit_gaussian(&array, readings, ALL, &usual, &result);
-    assert_finite_and_defined();
-    TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_LOW_SIGNAL, result.flags);
+    TEST_ASSERT_EQUAL_HEX32(CONTACT_FLAG_LOW_SIGNAL, flags_of_equal(levels[i]));
   }
 }
 
