@@ -13,7 +13,7 @@ however slow the emulator was:
 That of a lift in host_tools/README.md is of the firmware on the host:
 
     cd build/host/host_tools
-    simulation/twin/twin scenario lift --seconds 20 --force 6 --tangential 0.35,-40 --gain 2 --seed 5 -o lift_scenario.csv
+    simulation/twin/twin scenario lift --seconds 20 --force 6 --tangential 0.35,-40 --effects gain=2 --seed 5 -o lift_scenario.csv
     simulation/player/fingertip_player play lift_scenario.csv -o lift.csv --raw --pad 12 --rate 200
     /usr/bin/python3 ../../../host_tools/demo/picture.py lift.csv --at 17.2 -o ../../../host_tools/demo/lift.png
 

@@ -207,7 +207,7 @@ class Use(PageTest):
 class Calibrate(PageTest):
     """As the tool's own test of the emulated image does, in the browser: host time does not matter, the image runs as fast as it can."""
 
-    PLACEMENTS = ("--gain", 10, "--seed", 41, "--pad", 7)
+    PLACEMENTS = ("--effects", "gain=10", "--seed", 41, "--pad", 7)
 
     def start(self):
         """Its placements come again and again: how many pass before the page asks for them depends on this machine."""
@@ -370,7 +370,7 @@ class Looks(PageTest):
 
     def paused(self, recording=None, steps=MOMENT_STEPS):
         """A page that shows the same moment of the same recording; without one: of a lime that slips, simulated."""
-        recording = recording or self.recorded("lime.csv", self.scenario("slip", "--indenter", "lime", "--gain", 10, "--seconds", 12))
+        recording = recording or self.recorded("lime.csv", self.scenario("slip", "--indenter", "lime", "--effects=gain=10", "--seconds", 12))
         page = self.open(before=TEN_TIMES)
         page.give("input[type=file]", recording)
         page.until("fingertip.fingertips[0]?.state === 'closed'")
@@ -426,7 +426,7 @@ class Looks(PageTest):
 
     def test_the_manuals_picture(self):
         """What the boards' default scene shows of a fingertip that knows its pad: a pull beside force and place."""
-        lift = self.scenario("lift", "--seconds", 20, "--force", 6, "--tangential", "0.35,-40", "--gain", 2, "--seed", 5)
+        lift = self.scenario("lift", "--seconds", 20, "--force", 6, "--tangential", "0.35,-40", "--effects", "gain=2", "--seed", 5)
         page = self.paused(self.recorded("pulled.csv", lift, "--pad", 12, "--rate", 200), MANUALS_STEPS)
         self.assertRegex(page.run("document.body.innerText"), r"Pull")
         found = self.shown(page, "manual")

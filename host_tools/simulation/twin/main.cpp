@@ -30,7 +30,6 @@ constexpr double SHORE_MIN = 5.0, SHORE_MAX = 70.0; // Gent's relation is for ru
 struct Options {
   ScenarioOptions scenario;
   std::string effects;
-  std::string gain;
   std::string output;
   bool overwrite = false;
   std::string cache;
@@ -164,14 +163,6 @@ int width(const Options &options) {
 int scenario(Options &options) {
   ScenarioOptions &chosen = options.scenario;
   chosen.effects = parse_effects(options.effects);
-  if (!options.gain.empty()) {
-    const double percent = parse_effects("gain=" + options.gain).at("gain");
-    if (percent > 0.0) {
-      chosen.effects["gain"] = percent;
-    } else {
-      chosen.effects.erase("gain");
-    }
-  }
   const Layer layer = layer_of(chosen.layer_mm);
   chosen = complete(chosen);
   check_output(options.output, options.overwrite);
@@ -257,7 +248,6 @@ int run(int argc, char **argv) {
   option(write, "-o,--output", options.output, "FILE.csv", "The scenario to write")->required();
   with_contact(write);
   option(write, "--overhang", s.overhang_mm, "MM", "The pad ends so far beyond its outer sensors; default: never");
-  option(write, "--gain", options.gain, "PERCENT", "Short for the effect gain; 0: none");
   option(write, "--effects", options.effects, "NAME[=VALUE],...", "Errors of the pad, as in \"drift,relaxation=20\"; none (default), all");
   const auto seed = [&](const char *name, auto &value, const char *help) {
     const auto set = [&value, name](const std::string &text) { value = seed_from_text(name, text); };

@@ -28,12 +28,12 @@ def setUpModule():
     global folder, placed, pulled, serial, gains, mean_gain
     folder = tempfile.TemporaryDirectory(prefix="fingertip-test-")
     unittest.addModuleCleanup(folder.cleanup)
-    placed, scenario = make_placements("good", "--gain", "10", "--seed", "6")
+    placed, scenario = make_placements("good", "--effects", "gain=10", "--seed", "6")
     errors = re.search(r"^# gain_errors_percent: (.*)$", pathlib.Path(scenario).read_text(encoding="utf-8"), re.M)
     gains = np.array([1 + float(word) / 100 for word in errors[1].split()])
     mean_gain = gains.mean()
     gains /= mean_gain
-    pulled, _ = make_pulls("pulls", "--gain", "2", "--seed", "31")
+    pulled, _ = make_pulls("pulls", "--effects", "gain=2", "--seed", "31")
     serial = re.search(r"^# serial: (\S+)$", pathlib.Path(pulled).read_text(encoding="utf-8"), re.M)[1]
 
 
@@ -174,8 +174,8 @@ class Gains(CalibrateTest):
 
     def test_refuses_with_the_reason(self):
         for played, reason in (
-            (make_placements("weights", "--gain", "10", "--force", "2.5,3.5"), "not calibrated: .*use one and the same weight"),
-            (make_placements("hand", "--gain", "10", kind="pokes"), "not calibrated: no placement was found"),
+            (make_placements("weights", "--effects", "gain=10", "--force", "2.5,3.5"), "not calibrated: .*use one and the same weight"),
+            (make_placements("hand", "--effects", "gain=10", kind="pokes"), "not calibrated: no placement was found"),
             (make_placements("no pressures", "--seconds", "10", raw=()), "has no pressures to calibrate from; record with a firmware"),
         ):
             self.assertRegex(self.refused("--from", played[0], "--dry-run"), reason)
@@ -244,9 +244,9 @@ class Gains(CalibrateTest):
 class Drags(CalibrateTest):
     def test_finds_the_scale_within_its_sd(self):
         for name, thickness, *options in (
-            ("equal gains", "12", "--gain", "0", "--seed", "32"),
-            ("unequal gains", "12", "--gain", "2", "--seed", "33"),
-            ("another thickness than it is told", "11", "--gain", "2", "--seed", "34"),
+            ("equal gains", "12", "--seed", "32"),
+            ("unequal gains", "12", "--effects", "gain=2", "--seed", "33"),
+            ("another thickness than it is told", "11", "--effects", "gain=2", "--seed", "34"),
         ):
             with self.subTest(name):
                 played, scenario = make_pulls(name, *options, pad=("--pad", thickness))
@@ -295,12 +295,12 @@ class Drags(CalibrateTest):
     def test_refuses_with_the_reason(self):
         for played, pull, reason in (
             (
-                make_pulls("weak", "--gain", "10", "--seed", "2", "--tangential", "0.05"),
+                make_pulls("weak", "--effects", "gain=10", "--seed", "2", "--tangential", "0.05"),
                 "0.15",
                 r"0\.15 N is small beside .* possible error there, 0\.\d\d N: pull harder",
             ),
-            (make_pulls("still", "--gain", "0", kind="placements"), str(PULL_N), "no pull was found"),
-            (make_pulls("without", "--gain", "0", seconds=30, pad=()), str(PULL_N), "no pad profile; fingertip pad --thickness MM first"),
+            (make_pulls("still", kind="placements"), str(PULL_N), "no pull was found"),
+            (make_pulls("without", seconds=30, pad=()), str(PULL_N), "no pad profile; fingertip pad --thickness MM first"),
             ((pulled,), "3.8", "the readings are not those of 3.80 N"),
         ):
             self.assertRegex(self.refused("--from", played[0], "--dry-run", drag=True, pull=("--force", pull)), reason)

@@ -19,7 +19,7 @@ def setUpModule():
     global folder, recording
     folder = pathlib.Path(unittest.enterModuleContext(tempfile.TemporaryDirectory(prefix="fingertip-test-")))
     scenario, recording = folder / "lift.csv", folder / "recording.csv"
-    options = "--seconds 6 --force 6 --tangential 0.35,0 --gain 0 --seed 5"
+    options = "--seconds 6 --force 6 --tangential 0.35,0 --seed 5"
     subprocess.run([TWIN, "scenario", "lift", *options.split(), "-o", scenario, "--cache", TABLES], check=True, stdout=subprocess.DEVNULL)
     subprocess.run([PLAYER, "play", scenario, "-o", recording, "--raw", "--rate", "100", "--quiet"], check=True)
 

@@ -111,7 +111,7 @@ class Files(TwinTest):
                 self.assertEqual(len(scenario.intervals("contact")), len(acts))
 
     def test_same_options_same_bytes_and_other_seeds_others(self):
-        options = ("taps", "--seconds", "20", "--gain", "10", "--effects", "relaxation,hysteresis")
+        options = ("taps", "--seconds", "20", "--effects", "gain=10,relaxation,hysteresis")
         files = {}
         for name, more in {"a": (), "b": (), "seed": ("--seed", "2"), "pad": ("--pad", "2")}.items():
             path = self.folder / name / "played.csv"
@@ -267,7 +267,7 @@ class Usage(TwinTest):
             ("taps", "--layer", "1"): "--layer 1 is out of range; give 3 to 20 mm",
             ("taps", "--layer", "nan"): "--layer nan is out of range",
             ("taps", "--effects", "noise"): 'there is no effect "noise"; give some of: dip, widths',
-            ("taps", "--gain", "ten"): 'effect gain is "ten"; give 0 to 30 (%)',
+            ("taps", "--effects", "gain=ten"): 'effect gain is "ten"; give 0 to 30 (%)',
             ("taps", "--overhang", "2"): "--overhang 2 is out of range; give 3 to 20",
             ("taps", "--overhang", "9", "--layer", "3"): "--layer of a pad that ends 3 is out of range; give 4 to 20",
             ("taps", "--seconds", "0"): "--seconds 0 is out of range; give 1 to 7200",
