@@ -1,4 +1,4 @@
-"""A third board is a folder: beside nothing else that is new, it is built, emulated, examined and measured by its descriptor.
+"""A third board is a folder: beside nothing else that is new, it is built, emulated, examined and measured by its descriptor. It has the largest pad.
 
 usage: test_board.py --fingertip TOOL --command_frame PROGRAM --node NODE
 """
@@ -16,8 +16,9 @@ from emulation import ROOT, Run, emulate, main, write_scenario
 
 TOOLS = argparse.Namespace()
 PATTERN, THIRD = "pico_mux", "pico_third"
-# Nothing of it is as on the board that it is a copy of.
-WIRING = {"pin_sda": 12, "pin_scl": 13, "mux_address_0": "0x71", "pin_mux_reset_0": 18}
+# No pin of it is as on the board that it is a copy of.
+SENSORS = 36
+WIRING = {"pin_sda": 12, "pin_scl": 13, "pin_mux_reset_0": 14, "sensor_count": SENSORS, "sensors_of_strip": 6}
 EXAMINER = """
 #include "tool/doctor/wiring.hpp"
 #include <iostream>
@@ -47,7 +48,7 @@ class ThirdBoard(unittest.TestCase):
         for path in [*board.glob("*.[ch]"), board / "CMakeLists.txt"]:
             path.write_text(path.read_text().replace(PATTERN, THIRD))
         descriptor = json.loads((board / "board.json").read_text())
-        descriptor["wiring"] |= WIRING
+        descriptor["pad"], descriptor["wiring"] = "6x6", descriptor["wiring"] | WIRING
         descriptor["overhead_us"] = 1000
         (board / "board.json").write_text(json.dumps(descriptor))
         cls.build = cls.tree / "build" / THIRD
@@ -64,12 +65,13 @@ class ThirdBoard(unittest.TestCase):
     def test_it_is_built_and_runs_on_its_own_pins(self):
         run("cmake", "--build", self.build, "--target", f"fingertip-{THIRD}")
         emulator, image = self.tree / "host_tools/simulation/emulator/main.mjs", self.build / f"fingertip-{THIRD}.bin"
-        rest, commands = write_scenario(self.tree / "build/rest.csv"), [(0.46, "info"), (0.47, "stream", "contact,raw,health")]
+        rest, commands = write_scenario(self.tree / "build/rest.csv", sensors=SENSORS), [(0.46, "info"), (0.47, "stream", "contact,raw,health")]
         done = Run(TOOLS, self.build, "third", THIRD, rest, 0.8, commands, emulator=emulator, image=image)
         self.assertEqual(done.report["warnings"], [])
         self.assertEqual(done.recording.metadata["board"], THIRD)
-        self.assertIn((1 << 15) - 1, done.recording["valid"])
+        self.assertIn((1 << SENSORS) - 1, done.recording["valid"])
         capture = {"capture": self.build / "none.ftr", "host_script": done.path("script")}
+        rest = write_scenario(rest)
         emulate(TOOLS, emulator, board=PATTERN, image=image, scenario=rest, seconds=0.8, **capture)  # whose pins are others
         bench = f"import {{ ImageBench }} from '{self.tree}/tests/emulated/harness/image_bench.mjs'; const b = new ImageBench("
         tools = {"fingertip": str(TOOLS.fingertip), "command_frame": str(TOOLS.command_frame)}
@@ -87,8 +89,8 @@ class ThirdBoard(unittest.TestCase):
         folders = (f"-I{self.tree}/host_tools", f"-I{host}/boards")
         run("g++", "-std=c++17", *folders, source, self.tree / "host_tools/tool/doctor/wiring.cpp", "-o", program)
         place, multiplexer, everything, overhead_us = run(program).stdout.splitlines()
-        self.assertEqual(place, "strip 2, channel 3 of multiplexer 0x73")
-        self.assertIn("RESET on GP20 (pin 26)", multiplexer)
+        self.assertEqual(place, "strip 2, channel 1 of multiplexer 0x72")
+        self.assertIn("RESET on GP16 (pin 21)", multiplexer)
         self.assertIn("SDA on GP12 (pin 16), SCL on GP13 (pin 17)", everything)
         self.assertEqual(overhead_us, "1000")
 
