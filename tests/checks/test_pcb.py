@@ -113,10 +113,7 @@ TEXTS, BOMS = (
     {bus: next(path.glob(f"*{end}")).read_text(encoding="utf-8") for bus, path in FOLDERS.items()} for end in (".kicad_pcb", "-bom.csv")
 )
 PAD = geometry.pad(ROOT / "boards/pads/3x5.json")
-
-
-def errors_of_boards():
-    return [line for bus, text in TEXTS.items() for line in pcb_check.wrong(text, BOMS[bus], BOARDS[bus], PAD)]
+ERRORS = [line for bus, text in TEXTS.items() for line in pcb_check.wrong(text, BOMS[bus], BOARDS[bus], PAD)]
 
 
 def errors_of_plants():
@@ -166,7 +163,7 @@ def off_um(folder, board):
 
 class Pcb(unittest.TestCase):
     def test_boards_are_what_their_descriptors_say(self):
-        self.assertEqual(errors_of_boards(), [])
+        self.assertEqual(ERRORS, [])
 
     def test_wrong_nets_and_places_are_found(self):
         self.assertEqual([name for name, errors in errors_of_plants().items() if not errors], [])
@@ -188,12 +185,12 @@ class Copper(unittest.TestCase):
         found |= {name: self.judged(bus, plant).get(name.split(":")[0]) for bus in FOLDERS for name, plant in COPPER[bus].items()}
         one, two = (pathlib.Path(self.enterContext(tempfile.TemporaryDirectory())) for _ in range(2))
         self.assertEqual([fabricate.main([folder]) for folder in (one, two)], [0, 0])
-        boards, errors = {bus: pcb_check.Board(text) for bus, text in TEXTS.items()}, errors_of_boards()
+        boards = {bus: pcb_check.Board(text) for bus, text in TEXTS.items()}
         differ = [path for path in one.rglob("*.*") if path.read_bytes() != (two / path.relative_to(one)).read_bytes()]
         figures = {key: sum(board[key] for board in right) for key in right[0]} | {
             "boards": len(FOLDERS),
-            "netlist_errors": len(errors),
-            "vias_under_sensors": sum(line.startswith("a via under") for line in errors),
+            "netlist_errors": len(ERRORS),
+            "vias_under_sensors": sum(line.startswith("a via under") for line in ERRORS),
             "pad_places_off_um": max(off_um(one / path.parent.name, boards[bus]) for bus, path in FOLDERS.items()),
             "rise_ns": {net: round(ns) for net, ns in pcb_check.rises_ns(BOARDS["parallel"], boards["parallel"]).items()},
             "planted": len(found),
@@ -203,7 +200,7 @@ class Copper(unittest.TestCase):
         figures_file.add(ROOT / "build/report/board.json", figures)
         self.assertEqual([name for name, errors in found.items() if not errors], [])
         nothing = {name: value for name, value in figures.items() if name not in ("boards", "planted", "rise_ns")}
-        self.assertEqual(nothing, dict.fromkeys(nothing, 0), errors)
+        self.assertEqual(nothing, dict.fromkeys(nothing, 0), ERRORS)
 
 
 if __name__ == "__main__":
