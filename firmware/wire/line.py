@@ -336,17 +336,7 @@ def bodies_h(line):
     return lines
 
 
-KINDS = {
-    "u8": "BYTES",
-    "text": "TEXTS",
-    "n": "SENSOR_COUNT",
-    "u16": "U16",
-    "i16": "U16",
-    "u32": "U32",
-    "u64": "U64",
-    "f32": "F32",
-    "map": "MAP",
-}
+KINDS = {"u8": "BYTES", "text": "TEXTS", "n": "SENSOR_COUNT", "i16": "U16"}  # others by their own name
 
 
 def runs_of(body, line, wide, when=None, prefix=""):
@@ -361,9 +351,10 @@ def runs_of(body, line, wide, when=None, prefix=""):
         if field.pair:
             run = ("F32_PAIRS" if field.kind == "f32" else "PAIRS", 1, prefix + field.pair[0], condition)
         elif field.each:
-            run = (f"SENSORS_{KINDS[field.kind]}", field.per_sensor, f"{member}[0].{field.each[0]}", condition)
+            run = (f"SENSORS_{KINDS.get(field.kind, field.kind.upper())}", field.per_sensor, f"{member}[0].{field.each[0]}", condition)
         else:
-            run = (KINDS["u32" if field.kind == "map" and not wide else field.kind], field.times, member, condition)
+            kind = "u32" if field.kind == "map" and not wide else field.kind
+            run = (KINDS.get(kind, kind.upper()), field.times, member, condition)
         if runs and runs[-1][0] == run[0] and runs[-1][3] == condition and run[0] in ("BYTES", "TEXTS", "U16", "U32", "F32"):
             runs[-1] = (run[0], runs[-1][1] + run[1], *runs[-1][2:])
         else:

@@ -137,9 +137,8 @@ def load(measure, compared, set_, mask, seed, count, cache):
         solve(compared, made, np.flatnonzero(missing), f"reference of set {set_}, mask {mask}")
         kept.parent.mkdir(parents=True, exist_ok=True)
         np.savez(kept, source=SOURCE, usable=made.usable, readings=made.readings, best=made.best)
-    largest = np.where(
-        made.usable[:, None] >> np.arange(SENSORS, dtype=np.uint64) & np.uint64(1), made.readings, np.iinfo(np.int32).min
-    ).max(axis=1)
+    bits = np.uint64(1) << np.arange(SENSORS, dtype=np.uint64)
+    largest = np.where(made.usable[:, None] & bits, made.readings, np.iinfo(np.int32).min).max(axis=1)
     made.observable = made.best["observable"] & (largest >= GATE_NOISES * 1024 * made.noise_Pa)
     made.set = set_
     return made

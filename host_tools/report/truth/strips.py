@@ -155,10 +155,8 @@ class Presses:
     def __init__(self, firmware, strip):
         self.firmware = firmware
         contact, doubtful, usable, pressure = conditioned(firmware, strip.t_s - strip.t_s[0], strip.pressure_Pa, NOISE_Pa)
-        strong = (
-            np.where(usable[:, None] >> np.arange(SENSORS, dtype=np.uint64) & np.uint64(1), pressure, 0).max(axis=1)
-            >= 1024 * LOCATED_LEAST_Pa
-        )
+        bits = np.uint64(1) << np.arange(SENSORS, dtype=np.uint64)
+        strong = np.where(usable[:, None] & bits, pressure, 0).max(axis=1) >= 1024 * LOCATED_LEAST_Pa
         used = contact & ~doubtful & strong
         x_mm, full, pressure = strip.x_mm[used], strip.full[used], pressure[used]
         odd = round_half_away(x_mm).astype(int) % 2 != 0
