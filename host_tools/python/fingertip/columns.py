@@ -12,8 +12,6 @@ Array = npt.NDArray[np.float64]
 _BLOCK_rows = 4096
 _NARROW = 2.0**32 - 1  # a wider span of whole numbers is kept as doubles
 _SENT = {"h": (100.0, 2), "i": (Q10, 4)}  # by struct's codes: as parts of the unit, which text has with so many decimals
-_LINE, _TIME = "line", "time_us"
-_COUNTING = ("t_us", "frame", "sequence", "raw_sequence", _LINE)  # by about the same step
 
 
 def shortest(values: npt.NDArray[np.float32]) -> Array:
@@ -33,99 +31,65 @@ def shortest(values: npt.NDArray[np.float32]) -> Array:
 
 class Columns(Mapping[str, Array]):
     """By its name, a column's number for each row, NaN where the cell is empty. It is made when it is first asked for, and kept. Before that
-        it takes the bytes that its numbers need: those of a float, of a whole number those of its distance from the least in the block; none where
-    all are the same, or count on."""
+    each block has the distance of its numbers, or of a float's bits, from the least: in as many bytes as that needs, and none where all are the same."""
 
     def __init__(self, codes: Mapping[str, str], shown: Sequence[str], absent: Sequence[str]) -> None:
         """codes: struct's, by names. shown: the names to be asked for; absent: those that have no number."""
-        self._codes = {_TIME: "d", _LINE: "Q", **codes}
+        self._codes = {"time_us": "d", "line": "Q", **codes}
         self._shown, self._absent = shown, absent
-        names = list(self._codes)
-        self._floats = [at for at, name in enumerate(names) if self._codes[name] == "f"]
-        self._whole = [at for at, name in enumerate(names) if self._codes[name] not in "fd"]
-        self._counting = [(row, at) for row, at in enumerate(self._whole) if names[at] in _COUNTING]
-        scales = [_SENT[self._codes[names[at]]][0] if self._codes[names[at]] in _SENT else 1.0 for at in self._whole]
-        self._scales, self._unscaled = np.array(scales)[:, None], scales.count(1.0)
-        self._waiting = np.empty((len(names), _BLOCK_rows))
-        self._filled = 0
-        self._blocks: list[tuple[int, list[Any]]] = []  # rows, and of each column one number for all or an array
+        self._floats = [at for at, code in enumerate(self._codes.values()) if code == "f"]
+        self._scales = np.array([[_SENT[code][0]] for code in self._codes.values() if code in _SENT])
+        self._sent = len(self._codes) - len(self._scales)  # from here on
+        self._waiting: list[Array] = []
+        self._blocks: list[tuple[int, list[Any]]] = []  # rows, and of each column the least number and the distances, or doubles
         self._made: dict[str, Array] = {}
         self.rows = 0
 
     def append(self, table: Array, lines: Sequence[int], times_us: Sequence[float]) -> None:
         """Rows, the numbers of their lines, and in a recording of several their times on the recorder's clock."""
-        at = 0
-        while at < len(table):
-            to = min(len(table), at + _BLOCK_rows - self._filled)
-            rows = self._waiting[:, self._filled : self._filled + to - at]
-            rows[0] = times_us[at:to] if len(times_us) else np.nan
-            rows[1], rows[2:] = lines[at:to], table[at:to].T
-            self._filled += to - at
-            at = to
-            if self._filled == _BLOCK_rows:
-                self._pack()
+        self._waiting.append(np.column_stack((times_us if len(times_us) else np.full(len(table), np.nan), lines, table)))
         self.rows += len(table)
+        if sum(map(len, self._waiting)) >= _BLOCK_rows:
+            self._pack()
 
     def _pack(self) -> None:
-        table = self._waiting[:, : self._filled]
-        block: list[Any] = [self._all_or_one(table[0])] * len(table)
-        for at, values in zip(self._floats, table[self._floats].astype(np.float32)):
-            block[at] = self._all_or_one(values)
-        whole = table[self._whole]
-        scaled = whole[self._unscaled :]  # these come last
-        scaled *= self._scales[self._unscaled :]
-        scaled += np.copysign(0.5, scaled)
-        np.trunc(scaled, out=scaled)
-        steps = dict.fromkeys(self._whole, 0.0)
-        for row, at in self._counting:
-            step = (whole[row, -1] - whole[row, 0]) / max(self._filled - 1, 1)
-            if np.isfinite(step):
-                whole[row] -= np.rint(np.arange(self._filled) * step)
-                steps[at] = float(step)
-        least, most = whole.min(axis=1).tolist(), whole.max(axis=1).tolist()
-        for row, (at, values, low, high) in enumerate(zip(self._whole, whole, least, most)):
-            if low != low:
-                low, high = float(np.fmin.reduce(values)), float(np.fmax.reduce(values))
-                values = np.where(np.isnan(values), low - 1, values)
-            if not high - low < _NARROW:
-                block[at] = self._all_or_one(table[at] * self._scales[row])
-                continue
-            width = (int(high - low + 1).bit_length() + 7) // 8 if least[row] != high else 0
-            offsets = (values - (low - 1)).astype("<u4") if width else None  # from 1; 0 is a gap
-            block[at] = low - 1, steps[at], offsets.view(np.uint8).reshape(-1, 4)[:, :width].copy() if offsets is not None else None
-        self._blocks.append((self._filled, block))
-        self._filled = 0
-
-    @staticmethod
-    def _all_or_one(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        bits = values.view(f"u{values.itemsize}")
-        return values[: 1 if (bits == bits[0]).all() else None].copy()
+        whole = np.concatenate(self._waiting).T.copy()
+        self._waiting = []
+        whole[self._floats] = whole[self._floats].astype(np.float32).view(np.uint32)
+        sent = whole[self._sent :]
+        sent *= self._scales
+        sent += np.copysign(0.5, sent)
+        np.trunc(sent, out=sent)
+        block: list[Any] = []
+        for values, low, high in zip(whole, whole.min(axis=1).tolist(), whole.max(axis=1).tolist()):
+            least, most = (float(np.fmin.reduce(values)), float(np.fmax.reduce(values))) if np.isnan(low) else (low, high)
+            if most - least < _NARROW and block:
+                far = (np.nan_to_num(values - (least - 1)) if np.isnan(low) else values - (least - 1)).astype("<u4")  # from 1; 0 is a gap
+                width = (int(most - least + 1).bit_length() + 7) // 8
+                block.append((least - 1, far.view(np.uint8).reshape(-1, 4)[: 1 if low == high else None, :width].copy()))
+            else:
+                block.append(values[: 1 if np.isnan(most) else None].copy())
+        self._blocks.append((whole.shape[1], block))
 
     def take(self, names: Sequence[str]) -> Array:
         """[row, name] of columns that are not shown; once."""
-        if self._filled:
+        if any(map(len, self._waiting)):
             self._pack()
         found = np.empty((self.rows, len(names)))
         for to, name in enumerate(names):
             at, code, begin = list(self._codes).index(name), self._codes[name], 0
             for count, block in self._blocks:
                 kept, block[at] = block[at], None
-                column = found[begin : begin + count, to]
                 if isinstance(kept, tuple):
-                    least, step, offsets = kept
-                    words = np.zeros((count, 4), np.uint8)
-                    words[:, 0] = 1
-                    if offsets is not None:
-                        words[:, : offsets.shape[1]] = offsets
-                    column[:] = words.view("<u4")[:, 0]
-                    column[column == 0] = np.nan
-                    column += least + np.rint(np.arange(count) * step)
-                else:
-                    column[:] = shortest(kept) if code == "f" else kept
+                    words = np.zeros((len(kept[1]), 4), np.uint8)
+                    words[:, : kept[1].shape[1]] = kept[1]
+                    far = words.view("<u4")[:, 0]
+                    kept = np.where(far == 0, np.nan, far + kept[0])
+                    kept = shortest(kept.astype(np.uint32).view(np.float32)) if code == "f" else kept
+                found[begin : begin + count, to] = kept
                 begin += count
             if code in _SENT:
-                scale, decimals = _SENT[code]
-                found[:, to] = np.round(found[:, to] / scale, decimals)
+                found[:, to] = np.round(found[:, to] / _SENT[code][0], _SENT[code][1])
         return found
 
     def __getitem__(self, name: str) -> Array:

@@ -442,7 +442,7 @@ class _Reading:
         self.packets: list[tuple[str, dict[str, str]]] = []
         self.end: dict[str, str] = {}
         self.own_end: dict[str, str] = {}
-        self.wanted: list[int] | slice = slice(None)
+        self.wanted: list[int] = []
         self.columns: Columns | None = None
         self.waits: list[tuple[int, str, float]] = []  # rows of a joint recording, or of MCAP: line, text, time_us
         self.sensors = self.info_sensors = 0
@@ -474,8 +474,7 @@ class _Reading:
         self.clock = LogClock(self.metadata)
         self.sensors = self.rows.sensors if self.chosen is None else 0
         codes = {name: code for name, code in self.rows.codes.items() if self.chosen is None or name in self.chosen}
-        if self.chosen is not None:
-            self.wanted = [at for at, name in enumerate(self.rows.names) if name in codes]
+        self.wanted = [at for at, name in enumerate(self.rows.names) if name in codes]
         shown = list(codes)[: len(codes) - 2 * self.sensors]
         self.columns = Columns(codes, shown, [name for name in LATER_COLUMNS if name not in shown])
 
@@ -591,6 +590,7 @@ def read_recording(
     if not 0 <= from_s <= to_s:
         raise InputError(f"from {from_s:g} s to {to_s:g} s is no time in a recording; give 0 or more, the earlier first")
     interval_s = None if (from_s, to_s) == (0, math.inf) else (from_s, to_s)
+    np.empty(30_000_000, np.uint8)  # freed at once: glibc gives the memory of smaller arrays back no longer, only to ask for it again
     lines = _RecordingLines(path, progress, interval_s)
     reading = _Reading(path, lines.format == "2", serial, columns, interval_s)
     skipped = 0

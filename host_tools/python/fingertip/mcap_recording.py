@@ -274,10 +274,9 @@ Line = tuple[int, str, bool]  # number, text, whether it is torn
 
 
 class Contacts(NamedTuple):
-    """Messages of fingertip_msgs/Contact one after the other: the lines' numbers, their topics, their bytes, their times."""
+    """Messages of fingertip_msgs/Contact one after the other: the lines' numbers, their bytes, their times."""
 
     numbers: list[int]
-    topics: list[str]
     data: list[bytes]
     times_s: list[float]  # since the recording began
 
@@ -333,15 +332,15 @@ class McapLineReader:
         self._count = self._latest_ns = 0
         self._has_header = self._is_torn = self._has_any = False
 
-    def _damaged(self, topic: str, error: ValueError) -> Damaged:
-        text = f"a damaged message on {topic} ({error}), or one of another version of the tool; use --salvage to skip it"
+    def _damaged(self, name: str, error: ValueError) -> Damaged:
+        text = f"a damaged message {name} ({error}), or one of another version of the tool; use --salvage to skip it"
         return Damaged(f"{self.path}: {text}")
 
     def items(self) -> Iterator[Line | Contacts | Damaged | Skipped]:
         """The lines in their order, rows many at a time; what is damaged is among them, at its place."""
         for each in self._ordered():
             if isinstance(each, Contacts) and not self._has_header:
-                each = self._damaged(each.topics[0], ValueError("a row with no header line before it"))
+                each = self._damaged(CONTACT_TYPE, ValueError("a row with no header line before it"))
             yield self._of_line(each) if isinstance(each, tuple) and not isinstance(each, Contacts) else each
         if not self._has_any:
             raise InputError(f"{self.path}: no recording of a fingertip; give one that fingertip has written")
@@ -368,7 +367,7 @@ class McapLineReader:
                     last = max(last, *each.numbers)
                     yield each
                     continue
-                singles = [(number, Contacts([number], [topic], [data], [s])) for number, topic, data, s in zip(*each)]
+                singles = [(number, Contacts([number], [data], [s])) for number, data, s in zip(*each)]
             elif each is not None:
                 singles = [(each[0], each)]
             ready: list[Line | Contacts] = []
@@ -535,7 +534,6 @@ class McapLineReader:
         if self._begin_ns is None and wanted:
             self._begin_ns = min(time_ns for name, _, _, time_ns in wanted if name == wanted[0][0])
         numbers: list[int] = []
-        topics: list[str] = []
         rows: list[bytes] = []
         times_s: list[float] = []
         for name, topic, message, time_ns in wanted:
@@ -544,23 +542,22 @@ class McapLineReader:
             self._latest_ns = time_ns
             if name == CONTACT_TYPE and (number := self._number_of(message, topic)) is not None:
                 numbers.append(number)
-                topics.append(topic)
                 rows.append(message)
                 times_s.append((time_ns - (self._begin_ns or 0)) / 1e9)
                 continue
             if self._topic:
                 raise InputError(f"{self.path}: chunks in another order than that of time, and no index: mcap recover FILE -o OUT")
             if numbers:
-                found.append(Contacts(numbers, topics, rows, times_s))
-                numbers, topics, rows, times_s = [], [], [], []
+                found.append(Contacts(numbers, rows, times_s))
+                numbers, rows, times_s = [], [], []
             try:
                 row = decode(name, message)
                 if "\n" in row.get("text", "\n"):
                     raise ValueError("it ends within")
                 found.append((row["line"], row["text"], row["torn"]))
             except ValueError as error:
-                found.append(self._damaged(topic, error))
-        return [*found, Contacts(numbers, topics, rows, times_s)] if numbers else found
+                found.append(self._damaged(name, error))
+        return [*found, Contacts(numbers, rows, times_s)] if numbers else found
 
     def _number_of(self, message: bytes, topic: str) -> int | None:
         """Of a contact's line; None where there is none in it."""
@@ -647,4 +644,4 @@ class McapLineReader:
             if fine[begin]:
                 yield contacts.numbers[begin:end], devices[begin:end], times_us[begin:end], table[begin:end], contacts.times_s[begin:end]
             else:
-                yield self._damaged(contacts.topics[begin], ValueError("no row of this recording"))
+                yield self._damaged(CONTACT_TYPE, ValueError("no row of this recording"))

@@ -154,7 +154,6 @@ class Rows:
 
     def __init__(self, header: str) -> None:
         there = tuple(name for columns in (TANGENTIAL_COLUMNS, SHAPE_COLUMNS) if f",{columns[0]}," in header for name in columns)
-        self.later = [name for name in LATER_COLUMNS if name not in there]  # columns that are not there
         self._first_raw = 2 + len(CONTACT_COLUMNS) + len(there)
         first_sensor = self._first_raw + len(RAW_COLUMNS)
         self.sensors = max(0, (header.count(",") + 1 - first_sensor) // 2)
@@ -171,27 +170,23 @@ class Rows:
         self._whole = [at for at, wire in enumerate(contact, 2) if wire.code != "f"]
         most = {"f": 3.4e38, "h": 327.67, "i": 2097151.999}  # what is beyond is judged by values
         self._high = np.array([most.get(code) or np.nextafter(_LARGEST[code] + 1.0, 0) for code in self._codes])
-        self._low = np.array([-most.get(code, 0.0) for code in self._codes])
-        self._untold = 0  # flags of columns that are not there
-        for name in self.later:
-            when = wires[name].when
-            self._untold |= int(when[1]) if when else 0
-        self._has_point = np.array([code in "fhi" for code in self._codes])
+        of_absent = {wires[name].when for name in LATER_COLUMNS if name not in there}
+        self._untold = sum(int(when[1]) for when in of_absent if when)  # flags of columns that are not there
+        self._is_whole = np.array([code not in "fhi" for code in self._codes])
 
     def table(self, lines: bytes) -> Array | None:
         """As values of each row, many times as fast; None where one of them is not written as writers write most: values judges it then."""
-        found = cells_of(lines, len(self.names), self._has_point)
+        found = cells_of(lines, len(self.names), self._is_whole)
         if found is None or not self.sensors:
             return None
-        table, first_raw = found.values, self._first_raw
-        for row, at, cell in found.odd:
-            if self._codes[at] != "f":
-                return None
+        (table, odd), first_raw = found, self._first_raw
+        texts = lines.decode("utf-8", "surrogateescape").split("\n") if len(odd) else []
+        for row in odd.tolist():
             try:
-                table[row, at] = number(self.names[at], cell.decode("ascii", "replace"), _BINARY32)
+                table[row] = self.values(texts[row])
             except ValueError:
                 return None
-        if (table > self._high).any() or (table < self._low).any():
+        if (np.abs(table) > self._high).any():
             return None
         empty = np.isnan(table)
         has_contact, has_raw = ~empty[:, 2:3], ~empty[:, first_raw : first_raw + 1]

@@ -118,7 +118,7 @@ def main(argv):
         return 0
     wrong = differences([row[:6] for row in rows_in(text)], rows)
     if wrong:
-        raise InputError("\n".join([*wrong, f"{README.relative_to(ROOT)} is out of date: run scene_table.py without --check"]))
+        raise InputError("; ".join([*wrong, f"{README.relative_to(ROOT)} is out of date: run scene_table.py without --check"]))
     return 0
 
 
