@@ -134,7 +134,6 @@ export class Machine {
     this.host.connect(this.chip.usbCtrl);
     this.chip.boot();
     this.clockAlarm.schedule(CLOCK_CHECK_NS);
-    this.onPowerUp?.(this.chip);
   }
 
   /** Erratum E15 of the USB controller, in its next IN transfer: only a reset of the block ends it. */

@@ -2,7 +2,7 @@
  * A file that a run fills. What cannot be written ends this file, not the run: `failure` then holds one line,
  * `onFailure(line)` was called once, and further bytes are dropped.
  */
-import { closeSync, openSync, writeSync } from 'node:fs';
+import { closeSync, openSync, writeFileSync } from 'node:fs';
 import { InputError, inWords } from './errors.mjs';
 
 const BUFFER_BYTES = 65536;
@@ -41,9 +41,7 @@ export class OutputFile {
     const all = Buffer.concat(this.pending);
     this.pending = [];
     this.size = 0;
-    this.#attempt(() => {
-      for (let at = 0; at < all.length; ) at += writeSync(this.fd, all, at);
-    });
+    this.#attempt(() => writeFileSync(this.fd, all));
   }
 
   #attempt(action) {

@@ -50,10 +50,35 @@ export class I2cTarget {
   }
 }
 
+/** A transfer in the log of a bus; muxes: their control bytes, or the data line. */
+export class Transfer {
+  address = -1;
+  read = false;
+  bytes = [];
+  acknowledged = true;
+
+  constructor(start_ns, muxes) {
+    this.start_ns = start_ns;
+    this.end_ns = start_ns;
+    this.muxes = muxes;
+  }
+
+  /** The controller has sent a byte, of which the first is the address. */
+  sent(byte, acknowledged, statistics) {
+    if (this.address < 0) {
+      this.address = byte >> 1;
+      this.read = (byte & 1) === 1;
+    } else this.bytes.push(byte);
+    if (acknowledged) return;
+    this.acknowledged = false;
+    statistics.nacks += 1;
+  }
+}
+
 export class I2cBus {
   /**
    * @param options now_ns: () => time; rise_ns: SCL rise time; report: Report;
-   *   onTransfer({ start_ns, end_ns, address, read, bytes, acknowledged, muxes }): called at the end of each
+   *   onTransfer(transfer): called at the end of each
    */
   constructor({ now_ns, rise_ns, report, onTransfer = () => {} }) {
     this.now_ns = now_ns;
@@ -97,7 +122,7 @@ export class I2cBus {
   start() {
     this.#finish();
     this.waveform?.start(this.timing, this.now_ns());
-    this.current = { start_ns: this.now_ns(), address: -1, read: false, bytes: [], acknowledged: true, muxes: this.muxState() };
+    this.current = new Transfer(this.now_ns(), this.muxState());
     for (const t of this.targets) t.start();
   }
 
@@ -106,15 +131,7 @@ export class I2cBus {
     this.wasFast = false;
     for (const t of this.targets) acknowledged = t.write(byte) || acknowledged;
     this.waveform?.byte((byte << 1) | (acknowledged ? 0 : 1), this.timing, this.now_ns());
-    const transfer = this.current;
-    if (transfer.address < 0) {
-      transfer.address = byte >> 1;
-      transfer.read = (byte & 1) === 1;
-    } else transfer.bytes.push(byte);
-    if (!acknowledged) {
-      transfer.acknowledged = false;
-      this.statistics.nacks += 1;
-    }
+    this.current.sent(byte, acknowledged, this.statistics);
     return acknowledged;
   }
 

@@ -5,6 +5,7 @@
  * The board calls, in the order of time, `sclFell`, `sclRose`, `sdaFell`, `sdaRose`; `pulls` is whether the
  * target wants SDA low, and changes only in `sclFell` and where the target loses its place (START, STOP).
  */
+import { Transfer } from './i2c_bus.mjs';
 
 /** UM10204 table 10, fast mode, ns. tVD;DAT may be longer by what SCL stays low beyond tLOW. */
 const FAST_MODE = {
@@ -130,7 +131,7 @@ export class I2cLine {
       this.#expect('transmit');
     }
     if (this.phase === 'transmit') this.pulls = this.answer !== null && !((this.answer >> (7 - this.bits)) & 1);
-    this.current?.end(t_ns);
+    if (this.current) this.current.end_ns = t_ns;
   }
 
   #expect(phase) {
@@ -142,15 +143,7 @@ export class I2cLine {
 
   #received() {
     const { current } = this;
-    const [byte, acknowledged] = [this.byte >> 1, (this.byte & 1) === 0];
-    if (current.address < 0) {
-      current.address = byte >> 1;
-      current.read = (byte & 1) === 1;
-    } else current.bytes.push(byte);
-    if (!acknowledged) {
-      current.acknowledged = false;
-      this.statistics.nacks += 1;
-    }
+    current.sent(this.byte >> 1, (this.byte & 1) === 0, this.statistics);
     this.#expect(current.read ? 'transmit' : 'receive');
   }
 
@@ -214,23 +207,7 @@ export class I2cLine {
     this.current = null;
     if (!current || current.address < 0) return;
     this.statistics.transactions += 1;
-    current.end(t_ns);
+    current.end_ns = t_ns;
     this.onTransfer(current);
-  }
-}
-
-class Transfer {
-  constructor(start_ns, muxes) {
-    this.start_ns = start_ns;
-    this.end_ns = start_ns;
-    this.address = -1;
-    this.read = false;
-    this.bytes = [];
-    this.acknowledged = true;
-    this.muxes = muxes;
-  }
-
-  end(t_ns) {
-    this.end_ns = t_ns;
   }
 }

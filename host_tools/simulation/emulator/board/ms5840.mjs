@@ -198,21 +198,16 @@ export class Ms5840 extends I2cTarget {
     this.phase = 'idle';
   }
 
-  /** The supply dips, not as far as that: the part goes on converting, with another gain until it is reset (assumed). */
-  #brownOut() {
-    this.powerUp();
-    this.untrimmed = true;
-  }
-
   /** Faults that strike once. */
   #struck(faults) {
     const nack = (faults.nacks ?? 0) > this.nacks;
     if (nack) this.nacks += 1;
     if ((faults.brownOuts ?? 0) > this.brownOuts) {
       this.brownOuts += 1;
+      // The supply dips, not as far as at power-up: the part goes on converting, with another gain until it is reset (assumed).
       const { phase } = this;
-      this.#brownOut();
-      this.phase = phase;
+      this.powerUp();
+      Object.assign(this, { phase, untrimmed: true });
     }
     return nack;
   }
@@ -221,13 +216,9 @@ export class Ms5840 extends I2cTarget {
     return this.holding || this.tied;
   }
 
-  hold() {
-    this.holding = true;
+  hold(active) {
+    this.holding = active;
     this.heldClocks = 0;
-  }
-
-  release() {
-    this.holding = false;
   }
 
   clock() {

@@ -47,7 +47,7 @@ export class MultiplexedBoard {
       for (let channel = 0; channel < sensors_of_strip; channel++) mux.connect(channel, this.sensors[m * sensors_of_strip + channel]);
       mux.onReset = () => {
         mux.stuck = false;
-        for (const s of mux.channels.flat()) s.release();
+        for (const s of mux.channels.flat()) s.hold(false);
         this.bus.linesChanged();
       };
       return mux;
@@ -64,8 +64,7 @@ export class MultiplexedBoard {
   get faultActions() {
     return {
       sda_stuck_low: (sensor, active) => {
-        if (active) this.sensors[sensor].hold();
-        else this.sensors[sensor].release();
+        this.sensors[sensor].hold(active);
         this.bus.linesChanged();
       },
       line_stuck_low: (sensor, active) => {

@@ -106,8 +106,7 @@ export class ParallelBoard {
     };
     return {
       sda_stuck_low: onLine((_, active, k) => {
-        if (active) this.sensors[k].hold();
-        else this.sensors[k].release();
+        this.sensors[k].hold(active);
         this.#sensorsPull();
       }),
       line_stuck_low: onLine(tieLow),

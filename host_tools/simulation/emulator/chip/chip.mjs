@@ -148,7 +148,6 @@ export class Chip extends RP2040 {
     /** Executes nothing that makes sense until it is reset: its clock is none. */
     this.wild = false;
     this.onWatchdog = null;
-    this.onUsbBoot = null;
     this.sysClock = new SysClock(time, this.trueHz(rosc_hz));
     this.pio = [];
 
@@ -503,17 +502,12 @@ export class Chip extends RP2040 {
       const cycles = Math.max(1, Math.ceil((next - now) / time.ns_per_cycle - 1e-9));
       const stop = core.cycles + (second.isAwake ? Math.min(cycles, second.turn()) : cycles);
       time.earliestChanged = false;
-      try {
-        if (this.hooks.size) {
-          do {
-            this.hooks.get(core.registers[15] & ~1)?.(this);
-            core.executeInstruction();
-          } while (core.cycles < stop && !core.waiting && !time.earliestChanged);
-        } else core.execute(stop, time);
-      } catch (error) {
-        if (!(error instanceof MemoryFault)) throw error;
-        core.hardFault();
-      }
+      if (this.hooks.size) {
+        do {
+          this.hooks.get(core.registers[15] & ~1)?.(this);
+          core.executeInstruction();
+        } while (core.cycles < stop && !core.waiting && !time.earliestChanged);
+      } else core.execute(stop, time);
       if (second.state === 'runs') second.catchUp();
     }
   }

@@ -62,7 +62,7 @@ export class StrictCore extends CortexM0Core {
     this.codeBytes = bytes ? this.guardFrom : RAM_BYTES;
   }
 
-  hardFault() {
+  #hardFault() {
     if (this.IPSR === HARD_FAULT) this.chip.fail('core', 'a fault in the fault handler: the core locks up');
     this.guard([], 0);
     this.waiting = false;
@@ -191,9 +191,14 @@ export class StrictCore extends CortexM0Core {
     return this.cycles - before;
   }
 
-  /** Execute until `stop` cycles, sleep, or `time.earliestChanged`. */
+  /** Execute until `stop` cycles, sleep, a fault, or `time.earliestChanged`. */
   execute(stop, time) {
-    execute(this, stop, time);
+    try {
+      execute(this, stop, time);
+    } catch (error) {
+      if (!(error instanceof MemoryFault)) throw error;
+      this.#hardFault();
+    }
   }
 
   /** An instruction that is not one of `execute`'s, or whose access is not one to SRAM, by rp2040js, whose SEV does nothing. */

@@ -10,7 +10,7 @@
  * Fails the run: everything else, configuration written while enabled, FIFO overflow and underflow, counts below their
  * minimum, bus timing faster than the mode allows, pins not set up.
  */
-import { field, RegisterBlock } from './registers.mjs';
+import { checkedField, RegisterBlock } from './registers.mjs';
 
 const FIFO_DEPTH = 16;
 const CMD_READ = 0x100;
@@ -31,13 +31,7 @@ const ABRT_ARB_LOST = 1 << 12;
 const LOW_MIN_NS = 1300;
 const HIGH_MIN_NS = 600;
 
-const configuration = (key, mask, name) => ({
-  ...field(key, mask),
-  write(block, value) {
-    block.whileDisabled(name);
-    field(key, mask).write(block, value);
-  },
-});
+const configuration = (key, mask, name) => checkedField((block) => block.whileDisabled(name), key, mask);
 
 export class I2cBlock extends RegisterBlock {
   constructor(chip, index) {

@@ -244,56 +244,42 @@ export function execute(core, stop, time) {
           break;
         }
         case 12:
-        case 18: {
-          // STR immediate, or relative to sp
-          const isSp = op >>> 15;
-          const at = ((isSp ? r[13] + ((op & 0xff) << 2) : r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) - RAM_BASE) | 0;
-          isOthers = ((at >>> 2) | (at << 30)) >>> 0 >= WORDS || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes;
-          if (isOthers) break;
-          ram32[at >>> 2] = r[(isSp ? op >>> 8 : op) & 7];
-          cycles += 1;
-          break;
-        }
         case 13:
+        case 18:
         case 19: {
-          // LDR immediate, or relative to sp
+          // STR, LDR immediate, or relative to sp
           const isSp = op >>> 15;
+          const isLoad = op & 0x800;
           const at = ((isSp ? r[13] + ((op & 0xff) << 2) : r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) - RAM_BASE) | 0;
-          isOthers = ((at >>> 2) | (at << 30)) >>> 0 >= WORDS || (at - guardFrom) >>> 0 < guardBytes;
+          isOthers = ((at >>> 2) | (at << 30)) >>> 0 >= WORDS || (at - guardFrom) >>> 0 < guardBytes || (!isLoad && at < readOnlyBytes);
           if (isOthers) break;
-          r[(isSp ? op >>> 8 : op) & 7] = ram32[at >>> 2];
+          const t = (isSp ? op >>> 8 : op) & 7;
+          if (isLoad) r[t] = ram32[at >>> 2];
+          else ram32[at >>> 2] = r[t];
           cycles += 1;
           break;
         }
-        case 14: {
-          const at = (r[(op >>> 3) & 7] + ((op >>> 6) & 0x1f) - RAM_BASE) | 0;
-          isOthers = at >>> 0 >= RAM_BYTES || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes;
-          if (isOthers) break;
-          ram8[at] = r[op & 7];
-          cycles += 1;
-          break;
-        }
+        case 14:
         case 15: {
+          // STRB, LDRB immediate
+          const isLoad = op & 0x800;
           const at = (r[(op >>> 3) & 7] + ((op >>> 6) & 0x1f) - RAM_BASE) | 0;
-          isOthers = at >>> 0 >= RAM_BYTES || (at - guardFrom) >>> 0 < guardBytes;
+          isOthers = at >>> 0 >= RAM_BYTES || (at - guardFrom) >>> 0 < guardBytes || (!isLoad && at < readOnlyBytes);
           if (isOthers) break;
-          r[op & 7] = ram8[at];
+          if (isLoad) r[op & 7] = ram8[at];
+          else ram8[at] = r[op & 7];
           cycles += 1;
           break;
         }
-        case 16: {
-          const at = (r[(op >>> 3) & 7] + ((op >>> 5) & 0x3e) - RAM_BASE) | 0;
-          isOthers = ((at >>> 1) | (at << 31)) >>> 0 >= HALFWORDS || at < readOnlyBytes || (at - guardFrom) >>> 0 < guardBytes;
-          if (isOthers) break;
-          ram16[at >>> 1] = r[op & 7];
-          cycles += 1;
-          break;
-        }
+        case 16:
         case 17: {
+          // STRH, LDRH immediate
+          const isLoad = op & 0x800;
           const at = (r[(op >>> 3) & 7] + ((op >>> 5) & 0x3e) - RAM_BASE) | 0;
-          isOthers = ((at >>> 1) | (at << 31)) >>> 0 >= HALFWORDS || (at - guardFrom) >>> 0 < guardBytes;
+          isOthers = ((at >>> 1) | (at << 31)) >>> 0 >= HALFWORDS || (at - guardFrom) >>> 0 < guardBytes || (!isLoad && at < readOnlyBytes);
           if (isOthers) break;
-          r[op & 7] = ram16[at >>> 1];
+          if (isLoad) r[op & 7] = ram16[at >>> 1];
+          else ram16[at >>> 1] = r[op & 7];
           cycles += 1;
           break;
         }

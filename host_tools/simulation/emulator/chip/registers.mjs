@@ -9,6 +9,15 @@ export const field = (key, mask = 0xffffffff) => ({
   },
 });
 
+/** The same, of a block that checks first whether it may be written now. */
+export const checkedField = (check, key, mask) => ({
+  ...field(key, mask),
+  write(block, value) {
+    check(block);
+    field(key, mask).write(block, value);
+  },
+});
+
 /** One whose bits a write of ones clears. */
 export const clearedByOnes = (key) => ({
   read: (block) => block[key],

@@ -17,7 +17,6 @@
  */
 import { Prng } from '../prng.mjs';
 import { StrictCore } from './core.mjs';
-import { MemoryFault } from './mpu.mjs';
 
 const TURN_CYCLES = 24;
 /** From an event to the answer's event: some twenty instructions and the waking. */
@@ -155,9 +154,6 @@ export class SecondCore {
     chip.takeTurn(core);
     try {
       core.execute(before + cycles, TO_ITS_END);
-    } catch (error) {
-      if (!(error instanceof MemoryFault)) throw error;
-      core.hardFault();
     } finally {
       chip.takeTurn(chip.core0);
     }

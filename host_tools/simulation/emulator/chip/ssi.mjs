@@ -5,20 +5,14 @@
  * the transmit FIFO holds data, or forced through IO_QSPI), and whether execute-in-place works with the present
  * settings and the flash as it is.
  */
-import { field, RegisterBlock } from './registers.mjs';
+import { checkedField, RegisterBlock } from './registers.mjs';
 
 const FIFO_DEPTH = 16;
 const TMOD_TX_AND_RX = 0;
 const TMOD_EEPROM_READ = 3;
 
 const LOST = { write() {} };
-const configuration = (name, key, mask) => ({
-  ...field(key, mask),
-  write(block, value) {
-    if (block.enabled) block.rp2040.fail('SSI', `configuration register ${name} written while enabled`);
-    field(key, mask).write(block, value);
-  },
-});
+const configuration = (name, key, mask) => checkedField((block) => block.whileDisabled(name), key, mask);
 
 export class Ssi extends RegisterBlock {
   constructor(chip, flash) {
@@ -42,6 +36,10 @@ export class Ssi extends RegisterBlock {
     this.sampleDelay = 0;
     this.driveEdge = 0;
     this.#settingsChanged();
+  }
+
+  whileDisabled(name) {
+    if (this.enabled) this.rp2040.fail('SSI', `configuration register ${name} written while enabled`);
   }
 
   #settingsChanged() {

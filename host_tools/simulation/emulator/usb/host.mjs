@@ -153,9 +153,7 @@ export class UsbHost {
   }
 
   resetDevice(done) {
-    this.#abandon();
-    this.#enumeration = this.#readdress(done);
-    this.portStep();
+    this.holdReset(undefined, done);
   }
 
   holdReset(for_ns, done = () => {}) {
