@@ -341,7 +341,11 @@ class McapLineReader:
         for each in self._ordered():
             if isinstance(each, Contacts) and not self._has_header:
                 each = self._damaged(CONTACT_TYPE, ValueError("a row with no header line before it"))
-            yield self._of_line(each) if isinstance(each, tuple) and not isinstance(each, Contacts) else each
+            if isinstance(each, tuple) and not isinstance(each, Contacts):
+                text = each[1].rstrip("\r")
+                self._is_joint = text == "# fingertip-recording 2" if self._is_joint is None else self._is_joint
+                self._has_header = self._has_header or text.strip(" \t\r")[:1] not in ("", "#")
+            yield each
         if not self._has_any:
             raise InputError(f"{self.path}: no recording of a fingertip; give one that fingertip has written")
         if self._is_torn:
@@ -604,14 +608,6 @@ class McapLineReader:
             topic, end = text(4)
             text(end)  # the encoding
             self._channels[number] = topic, self._schemas.get(schema, "")
-
-    def _of_line(self, line: Line) -> Line:
-        """Notes what it says of the rows."""
-        text = line[1].rstrip("\r")
-        if self._is_joint is None:
-            self._is_joint = text == "# fingertip-recording 2"
-        self._has_header = self._has_header or text.strip(" \t\r")[:1] not in ("", "#")
-        return line
 
     def tables(self, contacts: Contacts, rows: Rows) -> "Iterator[tuple[list[int], Array, Array, Array, list[float]] | Damaged]":
         """Numbers, devices, times, columns and log times, and what is damaged among them."""
