@@ -83,7 +83,8 @@ static uint32_t measure(void *context, int type, unsigned osr, uint64_t t_us) {
   if (array->noise > 0) {
     pressure_Pa += array->noise * sim_ms5840_noise_Pa(osr) * gaussian(array);
   }
-  return sim_ms5840_d1(array->sensor[k].prom, pressure_Pa, d2_at(array, k, t_us, 0));
+  const uint32_t d1 = sim_ms5840_d1(array->sensor[k].prom, pressure_Pa, d2_at(array, k, t_us, 0));
+  return array->noise > 0 ? d1 : d1 + (array->conversions & 1u); /* no sensor repeats itself */
 }
 
 void sim_array_init(struct sim_array *array, uint8_t sensor_count, uint64_t seed) {
@@ -153,6 +154,7 @@ static void note_early(struct sim_array *array, unsigned k, uint64_t t_us) {
 }
 
 static void broadcast(struct sim_array *array, uint64_t t_us) {
+  array->conversions++;
   bool anybody = false;
   for (unsigned k = 0; k < array->sensor_count; k++) {
     if (!is_alive(array, k)) {

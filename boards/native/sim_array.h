@@ -74,6 +74,7 @@ struct sim_array {
   uint8_t sensor_count;
   enum sim_array_operation { SIM_ARRAY_IDLE, SIM_ARRAY_COMMAND, SIM_ARRAY_READ, SIM_ARRAY_RECOVERY } operation;
   uint8_t command, byte_count, next_sensor;
+  uint32_t conversions;
   uint64_t transfer_end_us;
   bool hangs; /* the transfer under way never ends */
   bool needs_recovery;

@@ -8,19 +8,8 @@ void condition_stage_process(struct condition_stage *own, struct findings *found
   condition_frame(&own->condition, &found->frame, own->has_gains ? &own->gains : NULL, &found->conditioned);
 }
 
-/* A sensor whose supply dipped reads some 17 kPa less until it is reset. Its temperature shows that, so it is measured
- * before the zero is taken again (condition.h). */
-static void watch_below(struct condition_stage *own, const struct findings *found, struct scan *scan) {
-  const bool below = (own->condition.below & found->conditioned.usable) != 0;
-  if (below && !own->below) {
-    scan_ask_temperature(scan);
-  }
-  own->below = below;
-}
-
-void condition_stage_follow(struct condition_stage *own, const struct findings *found, struct scan *scan) {
+void condition_stage_follow(struct condition_stage *own, const struct findings *found) {
   condition_follow(&own->condition, &found->frame, &found->conditioned);
-  watch_below(own, found, scan);
 }
 
 void condition_stage_put(const struct condition_stage *own, const struct findings *found, struct wire_raw *packet) {

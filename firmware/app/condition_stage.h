@@ -1,15 +1,13 @@
 /* Stage: pressure above the zero, and whether anything touches (condition/condition.h). Reads findings.frame. Writes
- * findings.conditioned. Asks the scan for a temperature where one may explain a reading. */
+ * findings.conditioned. */
 #pragma once
 
 #include "app/findings.h"
 #include "common/calibration.h"
-#include "scan/scan.h"
 #include "wire/packet.h"
 
 struct condition_stage {
   bool has_gains;
-  bool below; /* in the last frame a sensor was below its zero */
   struct condition condition;
   struct condition_gains gains; /* of the calibration in use */
 };
@@ -17,7 +15,7 @@ struct condition_stage {
 void condition_stage_process(struct condition_stage *own, struct findings *found);
 
 /* After the frame's packets. */
-void condition_stage_follow(struct condition_stage *own, const struct findings *found, struct scan *scan);
+void condition_stage_follow(struct condition_stage *own, const struct findings *found);
 
 /* Fills in a raw packet. */
 void condition_stage_put(const struct condition_stage *own, const struct findings *found, struct wire_raw *packet);

@@ -153,7 +153,7 @@ void stages_follow(struct stages *stages, const struct findings *found, struct s
   if (found->frame.held) {
     return;
   }
-  condition_stage_follow(&stages->condition, found, scan);
+  condition_stage_follow(&stages->condition, found);
 #if FT_WITH_FIT
   if (plausibility_follow(&stages->plausibility, &found->frame, &found->conditioned)) {
     readings_doubt(&scan->readings, stages->plausibility.apart);

@@ -99,7 +99,7 @@ static int32_t scaled_by(int32_t value, uint32_t inverse_q16) {
 /* Fills in pressures and peak; the strongest sensor is the answer. */
 static uint8_t read_sensors(const struct condition *condition, const struct frame *frame, const struct condition_gains *gains,
                             struct conditioned *conditioned) {
-  int32_t peak = 0;
+  int32_t peak = 0, lowest = 0;
   uint8_t strongest = 0;
   sensor_map ready = conditioned->usable;
   for (uint8_t k = 0; k < frame->sensor_count; k++, ready >>= 1) {
@@ -115,9 +115,12 @@ static uint8_t read_sensors(const struct condition *condition, const struct fram
     if (above > peak) {
       peak = above;
       strongest = k;
+    } else if (above < lowest) {
+      lowest = above;
     }
   }
   conditioned->peak_Pa_q10 = peak;
+  conditioned->lowest_Pa_q10 = lowest;
   return strongest;
 }
 
@@ -239,7 +242,9 @@ static bool is_doubtful(struct condition *condition, const struct conditioned *c
     condition->sure = false;
     return conditioned->contact || (condition->zero_risen & usable) != 0;
   }
-  const bool is_clear = !condition->unsure && (condition->sudden & usable) != 0 && peak >= condition->strong_Pa_q10 &&
+  const int32_t most = larger(larger(peak, condition->memory_Pa_q10), condition->reached_Pa_q10) >> DIP_SHIFT;
+  const bool is_clear = !condition->unsure && conditioned->lowest_Pa_q10 >= -most - condition->gate.open_Pa_q10 &&
+                        (condition->sudden & usable) != 0 && peak >= condition->strong_Pa_q10 &&
                         peak > condition->strongest_Pa_q10 >> BAND_SHIFT;
   condition->sure = is_clear && !saturated;
   return !is_clear && !saturated;

@@ -49,6 +49,7 @@
  * - a contact less than three times what its zeros had taken when it left the band, or six times what they had taken of
  * it
  * - a contact below an eighth of the strongest press in it: what may remain of that one
+ * - a contact beside which a sensor is farther below its zero than a quarter of the strongest press
  * - no contact, but a zero that has taken more than opens the gate, or has not settled to that */
 #pragma once
 
@@ -141,6 +142,7 @@ struct conditioned {
   bool contact;                            /* the gate */
   bool zero_doubtful;                      /* a force and a zero that has moved look alike */
   int32_t peak_Pa_q10;                     /* strongest usable reading; 0 when none */
+  int32_t lowest_Pa_q10;                   /* the same of those below 0 */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor] above the zero, 1/1024 Pa, times 1 / gain (of
                                               at most 524288 Pa); 0 if not usable */
 };

@@ -44,8 +44,12 @@ void contact_judge(const struct contact_input *input, struct contact_result *res
   result->flags = flags;
 }
 
-/* A location that other settled sensors show may be another. One is passed over, a second begins the history again. */
+/* A location that other settled sensors show may be another. One is passed over, a second begins the history again. So are those that no
+ * settled sensor shows. */
 static bool is_passed_over(struct slip_history *history, sensor_map used) {
+  if (used == 0) {
+    return true;
+  }
   const bool stays = used == history->newest;
   history->newest = used;
   if (used != history->used && history->count != 0) {

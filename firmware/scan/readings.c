@@ -10,9 +10,8 @@ static uint32_t size_of(int32_t value) { return (uint32_t)(value ^ -(value < 0))
 
 static int32_t difference(int32_t a, int32_t b) { return (int32_t)((uint32_t)a - (uint32_t)b); }
 
-/* The sensor whose reading has stepped while all others of these did not move; all that have fallen, or risen faster
- * than presses do. Bitmaps. */
-static sensor_map find_alone(const struct frame *frame, sensor_map sensors, const int32_t last_Pa_q10[], bool is_fast, sensor_map *jolted) {
+/* Bitmap of the sensor whose reading has stepped while all others of these did not move. */
+static sensor_map find_alone(const struct frame *frame, sensor_map sensors, const int32_t last_Pa_q10[], bool *jolted) {
   sensor_map stepped = 0;
   uint32_t largest = 0;
   uint32_t second = 0;
@@ -20,9 +19,7 @@ static sensor_map find_alone(const struct frame *frame, sensor_map sensors, cons
     if (!(sensors >> k & 1u)) {
       continue;
     }
-    const int32_t step = difference(frame->pressure_Pa_q10[k], last_Pa_q10[k]);
-    *jolted |= step < -READINGS_JOLT_Pa_q10 || (is_fast && step > READINGS_JOLT_Pa_q10) ? sensor_bit(k) : 0;
-    uint32_t size = size_of(step);
+    const uint32_t size = size_of(difference(frame->pressure_Pa_q10[k], last_Pa_q10[k]));
     if (size > largest) {
       second = largest;
       largest = size;
@@ -31,32 +28,22 @@ static sensor_map find_alone(const struct frame *frame, sensor_map sensors, cons
       second = size;
     }
   }
+  *jolted = largest > READINGS_JOLT_Pa_q10;
   const uint32_t noises = READINGS_STILL_NOISES * (uint32_t)frame->noise_Pa_q10;
   const bool others_rest = second < noises || second < largest / READINGS_ALONE;
   return largest > READINGS_STEP_Pa_q10 && others_rest ? stepped : 0;
 }
 
-/* alone: the sensor whose reading has just stepped alone, or 0. */
-static void judge_alone(struct readings *readings, sensor_map alone, const struct frame *frame, const int32_t last_Pa_q10[]) {
-  if (alone) {
-    const unsigned k = count_sensors(alone - 1);
-    const int32_t to_Pa_q10 = frame->pressure_Pa_q10[k];
-    const int32_t step = difference(to_Pa_q10, last_Pa_q10[k]);
-    const int32_t change = difference(to_Pa_q10, readings->alone_to_Pa_q10);
-    if (alone == readings->alone && size_of(change) <= size_of(step) / 2) {
-      readings->suspects |= alone;
-    }
-    readings->alone_to_Pa_q10 = to_Pa_q10;
-  }
-  readings->alone = alone;
-}
-
-/* Of a sensor without a reading that counts the last one is kept, to hold the next against. */
+/* Of a sensor without a reading that counts the last one is kept, to hold the next against. What none was kept of has not moved. */
 static void keep(struct readings *readings, sensor_map usable, sensor_map left_out, const int32_t last_Pa_q10[], int32_t kept_Pa_q10[]) {
+  const sensor_map fresh = usable & ~(readings->has_last | readings->awaited);
   sensor_map bit = 1;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++, bit <<= 1) {
     if (!(usable & ~left_out & bit)) {
       kept_Pa_q10[k] = last_Pa_q10[k];
+    }
+    if (fresh & bit) {
+      readings->vouched_Pa_q10[k] = kept_Pa_q10[k];
     }
     readings->left_out += (left_out & bit) != 0;
   }
@@ -68,15 +55,14 @@ static __attribute__((noinline, cold)) sensor_map look_closer(struct readings *r
                                                               const int32_t last_Pa_q10[], int32_t kept_Pa_q10[]) {
   const bool all = usable == first_sensors(frame->sensor_count);
   const sensor_map seen = usable & (readings->has_last | readings->awaited);
-  sensor_map jolted = 0;
-  const bool is_fast = frame->t_us - readings->t_us < READINGS_FAST_us;
-  sensor_map stepped = find_alone(frame, seen, last_Pa_q10, is_fast, &jolted);
+  bool jolted;
+  sensor_map stepped = find_alone(frame, seen, last_Pa_q10, &jolted);
   stepped = readings->presses_are_shared ? stepped : 0;
   const sensor_map alone = all ? stepped & readings->has_last : 0;
   readings->restored |= alone | (stepped & readings->awaited);
-  readings->awaited &= ~usable;
-  judge_alone(readings, alone, frame, last_Pa_q10);
-  readings->jolted |= alone ? 0 : jolted & readings->has_last;
+  readings->suspects |= alone & readings->alone;
+  readings->alone = alone;
+  readings->jolted = readings->jolted || (jolted && !alone);
   sensor_map low = 0;
   sensor_map bit = 1;
   for (uint8_t k = 0; k < frame->sensor_count; k++, bit <<= 1) {
@@ -93,6 +79,8 @@ static __attribute__((noinline, cold)) sensor_map look_closer(struct readings *r
   readings->was_low = low | (readings->was_low & ~usable);
   const sensor_map left_out = low | alone;
   keep(readings, usable, left_out, last_Pa_q10, kept_Pa_q10);
+  readings->awaited &= ~usable;
+  readings->frames = usable != readings->counted ? READINGS_MOVED_FRAMES : readings->frames;
   return left_out;
 }
 
@@ -119,8 +107,16 @@ static struct glance compensate(const struct readings *readings, const uint32_t 
   return glance;
 }
 
+static __attribute__((noinline, cold)) bool has_moved(const struct readings *readings, const int32_t kept_Pa_q10[], uint8_t sensor_count) {
+  uint32_t sum_Pa = 0;
+  for (uint8_t k = 0; k < sensor_count; k++) {
+    sum_Pa += size_of(difference(kept_Pa_q10[k], readings->vouched_Pa_q10[k])) >> 10;
+  }
+  return sum_Pa > READINGS_MOVED_Pa;
+}
+
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], sensor_map good, struct frame *frame) {
-  const sensor_map usable = good & readings->has_thermal & ~(readings->suspects | (readings->jolted & readings->zero));
+  const sensor_map usable = good & readings->has_thermal & ~readings->suspects;
   const int32_t *last_Pa_q10 = readings->last_Pa_q10[readings->newest];
   readings->newest ^= 1;
   int32_t *kept_Pa_q10 = readings->last_Pa_q10[readings->newest];
@@ -131,12 +127,17 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], s
   const uint32_t noises = READINGS_STILL_NOISES * (uint32_t)frame->noise_Pa_q10;
   sensor_map left_out = 0;
   frame->saturated = 0;
+  readings->last_sum = glance.sum;
   if (usable != first_sensors(frame->sensor_count) || usable != readings->counted || (int32_t)glance.signs < 0 ||
       step + frame->sensor_count * noises >= READINGS_JOLT_Pa_q10) {
     left_out = look_closer(readings, frame, usable, last_Pa_q10, kept_Pa_q10);
   }
-  readings->last_sum = glance.sum;
-  readings->t_us = frame->t_us;
+  if (readings->frames < READINGS_MOVED_FRAMES) {
+    readings->frames++;
+  } else if (has_moved(readings, kept_Pa_q10, frame->sensor_count)) {
+    readings->moved = true;
+  }
+  readings->moved = readings->moved || readings->jolted;
   readings->counted = usable & ~left_out;
 
   const sensor_map valid = readings->counted & ~readings->unproven;
@@ -147,8 +148,8 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], s
   }
   frame->valid = valid;
   frame->saturated &= valid;
-  frame->doubtful = valid & (readings->doubtful | readings->jolted);
-  frame->unsettled = valid & (readings->doubted | readings->jolted);
+  frame->doubtful = readings->moved ? valid : valid & readings->doubtful;
+  frame->unsettled = readings->moved ? valid : valid & readings->doubted;
   frame->renewed = readings->renewed;
   readings->renewed = 0;
   frame->restored = readings->restored;

@@ -1,24 +1,23 @@
 /* From codes to readings, and which of them to believe. Main context; no bus, and no time but the frame's.
  *
- * Temperatures. A temperature may differ by more than READINGS_TEMPERATURE_STEP_MAX_cC from the sensor's last, or
- * READINGS_TEMPERATURE_NEAR_cC if that one is old (is_late). That is no change of temperature. The last one stays in
- * use, and the sensor is doubtful: each degree is worth some 240 Pa. Two of them that agree with each other come from a
- * sensor that has lost its state as its supply failed. It becomes a suspect. The first temperature of a sensor must be
- * near the others', too, but after a reset near its own last: it may have lost its state again, and so may most others
- * (supplies that dip once do so twice). If resets do not help for a second, and it reports the same twice, it is believed.
- * Far from the others' it stays doubtful.
+ * Temperatures. One that differs from the sensor's last by more than a pad warms meanwhile (step_max_cC) is not used. The
+ * last one stays in use, the sensor is doubtful, and the next one is asked for at once: each degree is worth some 240 Pa.
+ * Two of them that agree come from a sensor that has lost its state as its supply failed. It becomes a suspect. The first
+ * temperature of a sensor must be near the others', but after a reset near its own last: it may have lost its state
+ * again, and so may most others (supplies that dip once do so twice). If resets do not help for a second, and it reports
+ * the same twice, it is believed. Far from the others' it stays doubtful.
+ *
+ * Moves. A sensor whose supply dips may go on with codes that are off, at once or ever more: 1 % of a code is 2.6 kPa
+ * and 2.7 degC. So only a temperature vouches for pressures that have moved: by READINGS_MOVED_Pa, all sensors together,
+ * since the last temperature, or one of them by READINGS_JOLT_Pa_q10 at once. They are used, but all of them are doubtful until the
+ * next temperature, which is asked for at once. So they are when one has lost its admission. A sensor whose temperature has
+ * moved too, by READINGS_MOVED_cC, is a suspect, whatever the others do: after such a jolt at once. While one moves by less, or a code is
+ * that of the frame before, the doubt lasts.
  *
  * Pressures. A pressure below zero is left out. A second in a row makes the sensor a suspect. A large step of one
  * sensor alone is left out as well, since rubber passes any press on to its neighbours. If the next reading is back,
- * that was all. If it stays, still alone, the sensor is a suspect. Steps beside which others move count at once. So
+ * that was all. A second in a row makes the sensor a suspect. Steps beside which others move count at once. So
  * does every step while a sensor is missing, since that one may have measured it.
- *
- * A sensor whose supply dips may lose its state, and go on with codes that are off. Then it reads 0 once where its conversion was lost, or
- * its pressure falls, and its temperature steps. So one that reads 0 is left out until its next temperature, which is asked for at once.
- * One whose pressure falls by READINGS_JOLT_Pa_q10 at once with others' is doubtful until then, but used, for a release does the same where
- * frames are 5 ms or more apart in the twin: at 57 frames/s each quick release of more than 6 kPa. So is one that rises by as much within
- * READINGS_FAST_us. Only frames whose sum moves by as much are searched for it: moves that compensate each other hide a fall. If the
- * temperature has stepped from the sensor's own last it has lost its state, whatever the others do.
  *
  * A suspect is left out until it has been reset and its PROM read again. Then its temperature and its pressure count as its first. Its zero
  * still holds, since it is the same sensor, unless it was measured shortly before (condition.h). The same holds for a sensor whose pressure
@@ -50,45 +49,50 @@
  * 20 and 57 frames/s in a simulated pad of 6 mm with a pitch of 9 mm, up to 6 mm outside the array, the loneliest moves
  * a neighbour by 64 Pa and 1/160; on 12 mm by 3.1 kPa and a quarter. At 410 frames/s and more none is so fast. */
 #define READINGS_STILL_NOISES 6
-/* From one reading to the next. Codes that are 3 % off make 8 kPa. */
+/* Codes that are 3 % off make 8 kPa. */
 #define READINGS_JOLT_Pa_q10 (MS58XX_STEP_Pa * 768)
-/* Within it no press rises by as much, but a hard tap. */
-#define READINGS_FAST_us 6000u
+/* Less is no change of the force by a tenth, or of the place by 0.6 mm, in a press of 5 N. */
+#define READINGS_MOVED_Pa (MS58XX_STEP_Pa / 2)
+/* A hand warms a pad whose temperature stood still by 0.2 degC within the longest interval of temperatures. */
+#define READINGS_MOVED_cC 25
+/* From one temperature to the next that a move asks for: each takes the place of a frame, and two more are doubtful. */
+#define READINGS_MOVED_FRAMES 32
 #define READINGS_ALONE 256
 #define READINGS_APART_Pa_q10 (FT_APART_MAX_Pa * 1024)
 
 struct readings {
   bool presses_are_shared; /* see scan_settings */
   uint8_t newest;
-  uint64_t t_us;          /* of the last frame */
   int16_t temperature_cC; /* mean of the sensors admitted, the last one if there is none */
   uint8_t doubts_in_a_row;
-  sensor_map has_thermal;  /* bitmap */
-  sensor_map renewed;      /* bitmap: another sensor since the last frame */
-  sensor_map restored;     /* bitmap: since the last frame, as in frame.h */
-  sensor_map doubted;      /* bitmap: the last temperature was not used */
-  sensor_map strange;      /* bitmap: a temperature that is not near the others' is in use */
-  sensor_map unproven;     /* bitmap: the PROM's CRC differs and the sensor has not read like others */
-  sensor_map was_near;     /* bitmap: an unproven one did, at the last temperature */
-  sensor_map doubtful;     /* bitmap: used, and to be flagged */
-  sensor_map has_last;     /* bitmap: last_Pa_q10 holds a reading */
-  sensor_map counted;      /* bitmap: and was in the last frame */
-  sensor_map awaited;      /* bitmap: last_Pa_q10 is of before a reset */
-  uint32_t last_sum;       /* of the pressures of the last frame, modulo 2^32 */
-  sensor_map was_low;      /* bitmap: the last pressure was below zero */
-  sensor_map alone;        /* bitmap of one sensor: its last pressure stepped alone, ... */
-  int32_t alone_to_Pa_q10; /* ... from last_Pa_q10 to here */
-  sensor_map suspects;     /* bitmap: want a reset */
-  sensor_map jolted;       /* bitmap: doubtful until their temperature shows that they kept their state */
-  sensor_map zero;         /* bitmap: of those, left out */
-  sensor_map known;        /* bitmap: had a temperature, and has been there since */
-  sensor_map pardoned;     /* bitmap: resets have not helped */
-  uint32_t left_out;       /* since start: pressures below zero or that stepped alone */
-  sensor_map alike;        /* bitmap: has read the others' temperature since it came */
-  sensor_map was_alike;    /* bitmap: at the last temperature */
-  sensor_map apart;        /* bitmap: see readings_doubt() */
+  sensor_map has_thermal; /* bitmap */
+  sensor_map renewed;     /* bitmap: another sensor since the last frame */
+  sensor_map restored;    /* bitmap: since the last frame, as in frame.h */
+  sensor_map doubted;     /* bitmap: the last temperature was not used */
+  sensor_map strange;     /* bitmap: a temperature that is not near the others' is in use */
+  sensor_map unproven;    /* bitmap: the PROM's CRC differs and the sensor has not read like others */
+  sensor_map was_near;    /* bitmap: an unproven one did, at the last temperature */
+  sensor_map doubtful;    /* bitmap: used, and to be flagged */
+  sensor_map has_last;    /* bitmap: last_Pa_q10 holds a reading, of before it lost its state */
+  sensor_map counted;     /* bitmap: and was in the last frame */
+  sensor_map awaited;     /* bitmap: last_Pa_q10 is of before a reset */
+  uint32_t last_sum;      /* of the pressures of the last frame, modulo 2^32 */
+  sensor_map still;       /* bitmap: the code is that of the frame before. Set by the caller */
+  bool jolted;            /* at once: set by the caller, too */
+  bool moved;             /* all are doubtful until their temperature shows that they kept their state */
+  uint8_t frames;         /* since the last temperature, up to READINGS_MOVED_FRAMES */
+  sensor_map was_low;     /* bitmap: the last pressure was below zero */
+  sensor_map alone;       /* bitmap of one sensor: its last pressure stepped alone */
+  sensor_map suspects;    /* bitmap: want a reset */
+  sensor_map known;       /* bitmap: had a temperature, and has been there since */
+  sensor_map pardoned;    /* bitmap: resets have not helped */
+  uint32_t left_out;      /* since start: pressures below zero or that stepped alone */
+  sensor_map alike;       /* bitmap: has read the others' temperature since it came */
+  sensor_map was_alike;   /* bitmap: at the last temperature */
+  sensor_map apart;       /* bitmap: see readings_doubt() */
   struct ms58xx_thermal thermal[FT_MAX_SENSORS];
-  int16_t doubted_cC[FT_MAX_SENSORS];     /* [sensor] the temperature that was not used */
+  int32_t doubted_cC[FT_MAX_SENSORS];     /* [sensor] the temperature that was not used */
+  int32_t vouched_Pa_q10[FT_MAX_SENSORS]; /* [sensor] the last that counted when the last temperature came */
   int32_t last_Pa_q10[2][FT_MAX_SENSORS]; /* [newest][sensor] the last that counted */
 };
 
@@ -101,14 +105,14 @@ struct readings_temperature {
   sensor_map returned;            /* bitmap: was reset, perhaps after long */
   sensor_map prom_bad;            /* bitmap: the CRC differs */
   sensor_map admitted;            /* bitmap */
-  bool is_late;                   /* long after the one before */
+  int32_t step_max_cC;            /* by which a temperature may differ from the one before, after this time */
   bool is_soon;                   /* after the one before: nothing was away for long */
   bool is_patient;                /* resets have not helped for a second */
 };
 
 enum readings_news {
   READINGS_MOVED = 1,     /* the temperature changes */
-  READINGS_ASK_AGAIN = 2, /* soon: one is in doubt */
+  READINGS_ASK_AGAIN = 2, /* at once: one is in doubt */
 };
 
 /* Returns a bitmap of readings_news. Cost: some 800 Cortex-M0+ cycles a sensor. */

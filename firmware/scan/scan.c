@@ -6,11 +6,11 @@
 #define POWER_UP_us 10000u
 #define TEMPERATURE_INTERVAL_us (SCAN_TEMPERATURE_INTERVAL_ms * 1000u)
 #define TEMPERATURE_INTERVAL_MAX_us (SCAN_TEMPERATURE_INTERVAL_MAX_ms * 1000u)
-/* After a temperature reading that a sensor missed, or one in doubt. */
+/* After a temperature reading that a sensor missed. */
 #define TEMPERATURE_RETRY_us 100000u
 #define TEMPERATURE_AT_ONCE_us 1u
-/* After this time the sensors may have warmed by more than a degree: a hand warms them by 0.1 degC/s. */
-#define TEMPERATURE_LATE_us 5000000u
+/* More than the longest interval: the sensors may have warmed by more than usual. A hand warms them by 0.1 degC/s. */
+#define TEMPERATURE_LATE_us 3000000u
 /* How soon a temperature that was not taken is tried again. */
 #define SLOT_POLL_us 1000u
 /* How soon a new rate is noticed while waiting for the next frame of the old one. */
@@ -80,8 +80,6 @@ enum ft_status scan_set_osr(struct scan *scan, uint16_t osr) {
 
 void scan_set_rate_mHz(struct scan *scan, uint32_t rate_mHz) { set(&scan->period_us, rate_mHz == 0 ? 0 : 1000000000u / rate_mHz); }
 
-void scan_ask_temperature(struct scan *scan) { set(&scan->temperature_within_us, TEMPERATURE_RETRY_us); }
-
 void scan_rest(struct scan *scan, bool resting) { set(&scan->must_rest, resting); }
 
 static void wait_in(struct scan *scan, enum scan_state state, uint64_t until_us) {
@@ -116,7 +114,6 @@ static void end_bring_up(struct scan *scan) {
   set(&scan->temperature_within_us, 0); /* the next conversion is one */
   scan->void_next = 0;
   scan->was_zero = 0;
-  scan->zero_seen = 0;
   scan->missed_once = 0;
   scan->missed_twice = 0;
   convert(scan, true, false);
@@ -143,7 +140,7 @@ static sensor_map judge_answers(struct scan *scan, sensor_map heard, sensor_map 
   const sensor_map unusable = answered & (zero | scan->void_next);
   zero &= answered;
   admitted &= ~(missed & scan->missed_twice); /* the third in a row */
-  admitted &= ~(single ? zero : zero & scan->was_zero);
+  admitted &= ~(single || (zero & (zero - 1)) ? zero : zero & scan->was_zero);
   scan->missed_twice = missed & scan->missed_once;
   scan->missed_once = missed;
   scan->was_zero = zero;
@@ -156,11 +153,24 @@ static sensor_map judge_answers(struct scan *scan, sensor_map heard, sensor_map 
   return answered & ~unusable;
 }
 
+/* A sensor that measures never has the same code so often. Returns the bitmap of those that do. */
+static __attribute__((noinline, cold)) sensor_map find_frozen(struct scan *scan, sensor_map same) {
+  for (unsigned n = SCAN_STILL - 1; n > 0; n--) {
+    scan->still[n] = scan->still[n - 1] & same;
+  }
+  scan->still[0] = same;
+  const sensor_map frozen = scan->still[SCAN_STILL - 1];
+  set_map(&scan->admitted, scan_read_map(&scan->admitted) & ~frozen);
+  scan->wants_admission = scan->wants_admission || frozen;
+  return frozen;
+}
+
 /* Judges the codes in scan->result. Returns the bitmap of those that are measurements. */
 static sensor_map take_codes(struct scan *scan, const struct scan_conversion *conversion, uint32_t codes[]) {
   sensor_map zero = 0;
   sensor_map torn = 0;
   sensor_map ends_in_ones = 0;
+  sensor_map same = 0;
   sensor_map bit = 1;
   const uint8_t(*bytes)[ARRAY_BUS_MAX_READ_BYTES] = scan->result.bytes;
   for (int left = scan->sensor_count; left > 0; left--, bit <<= 1, bytes++) {
@@ -180,6 +190,8 @@ static sensor_map take_codes(struct scan *scan, const struct scan_conversion *co
       } else if (!codes || *codes != CODE_MAX) {
         torn |= bit;
       }
+    } else if (codes && code == *codes) {
+      same |= bit;
     }
     if (codes) {
       *codes++ = code;
@@ -193,13 +205,13 @@ static sensor_map take_codes(struct scan *scan, const struct scan_conversion *co
   }
   scan->void_next |= scan->bus->answers_are_single ? 0 : torn;
   count(&scan->counters.bus_nacks, count_sensors(torn));
-  return usable & ~torn;
+  const sensor_map good = usable & ~torn;
+  return codes && !conversion->is_temperature ? good & ~find_frozen(scan, good & same) : good;
 }
 
-static void take_reading(struct scan *scan, const struct scan_conversion *conversion) {
+static __attribute__((noinline)) void take_reading(struct scan *scan, const struct scan_conversion *conversion) {
   struct scan_slot *slot = slot_for(scan, conversion);
   sensor_map good = take_codes(scan, conversion, slot ? slot->code : NULL);
-  scan->zero_seen |= scan->was_zero;
   if (conversion->is_frame) {
     count(&scan->counters.frames, 1);
     if (good != first_sensors(scan->sensor_count)) {
@@ -225,8 +237,8 @@ static void take_reading(struct scan *scan, const struct scan_conversion *conver
     scan->bring_up.changed = 0;
     scan->returned = 0;
   } else {
-    slot->zero = (scan_read(&scan->slot_state) == SCAN_SLOT_FULL ? slot->zero : 0) | scan->zero_seen;
-    scan->zero_seen = 0;
+    slot->still = scan->still[0];
+    slot->zero = scan->was_zero;
   }
   hand_over(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state, SCAN_SLOT_FULL);
 }
@@ -467,7 +479,7 @@ static void adapt_interval(struct scan *scan, uint32_t news) {
   uint32_t interval_us = scan_read(&scan->temperature_interval_us);
   if (news != 0) {
     set(&scan->temperature_interval_us, TEMPERATURE_INTERVAL_us);
-    set(&scan->temperature_within_us, news & READINGS_ASK_AGAIN ? TEMPERATURE_RETRY_us : TEMPERATURE_INTERVAL_us);
+    set(&scan->temperature_within_us, news & READINGS_ASK_AGAIN ? TEMPERATURE_AT_ONCE_us : TEMPERATURE_INTERVAL_us);
   } else if (interval_us < TEMPERATURE_INTERVAL_MAX_us) {
     set(&scan->temperature_interval_us, 2 * interval_us);
   }
@@ -475,6 +487,7 @@ static void adapt_interval(struct scan *scan, uint32_t news) {
 
 static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
   const uint32_t apart_us = (uint32_t)(slot->conversion.t_us - scan->temperature_us);
+  const int32_t warmed_cC = (int32_t)(10u + (apart_us >> 14)); /* six times what a hand warms, and noise */
   const struct readings_temperature taken = {
       .prom = scan->bring_up.prom,
       .code = slot->code,
@@ -483,7 +496,9 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
       .returned = slot->returned,
       .prom_bad = scan_read_map(&scan->prom_bad),
       .admitted = scan_read_map(&scan->admitted),
-      .is_late = apart_us > TEMPERATURE_LATE_us,
+      .step_max_cC = apart_us > TEMPERATURE_LATE_us                 ? READINGS_TEMPERATURE_NEAR_cC
+                     : warmed_cC < READINGS_TEMPERATURE_STEP_MAX_cC ? warmed_cC
+                                                                    : READINGS_TEMPERATURE_STEP_MAX_cC,
       .is_soon = TEMPERATURE_INTERVAL_us > apart_us,
       .is_patient = scan->bring_up.interval_us > 1000000u,
   };
@@ -547,13 +562,14 @@ bool scan_take(struct scan *scan, struct frame *frame) {
     return false;
   }
   fill_head(scan, &scan->slot.conversion, frame);
-  const sensor_map jolted = scan->readings.jolted;
-  scan->readings.zero = (scan->readings.zero & jolted) | scan->slot.zero;
-  scan->readings.jolted |= scan->slot.zero;
-  if (readings_take_pressures(&scan->readings, scan->slot.code, scan->slot.good, frame)) {
+  struct readings *readings = &scan->readings;
+  const bool moved = readings->moved;
+  readings->jolted = readings->jolted || (scan->slot.zero | (readings->counted & ~scan_read_map(&scan->admitted))) != 0;
+  readings->still = scan->slot.still;
+  if (readings_take_pressures(readings, scan->slot.code, scan->slot.good, frame)) {
     report(scan);
   }
-  if (scan->readings.jolted & ~jolted) {
+  if (readings->moved && !moved) {
     set(&scan->temperature_within_us, TEMPERATURE_AT_ONCE_us);
   }
   hand_over(&scan->slot_state, SCAN_SLOT_EMPTY);

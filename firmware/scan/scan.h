@@ -9,10 +9,11 @@
  *
  * Only admitted sensors yield valid readings: see bring_up.h. Where a sensor does not acknowledge, that reading is
  * missing. The next one is missing too unless it is certain that the sensor heard its command, since it might be an old
- * one. The third in a row costs the admission. So does a reading of 0 (no conversion had finished) from a sensor that
- * had acknowledged the command. Where a branch acknowledges as one, the reading after a 0 is void too, and two in a row
- * cost the admission. A reading whose last sixteen bits are ones, far from the sensor's last one, comes from a sensor
- * that lost count of the clocks and stopped sending: see scan.c. readings.h has the other reasons that make a reading
+ * one. The third in a row costs the admission. So does a reading of 0: no conversion had finished, as one is lost in a dip
+ * of the supply. Where a branch acknowledges as one, a sensor may have missed the command instead: if it alone reads 0, once, only
+ * the next reading is void, and all are doubtful until the temperature, which comes at once. So does the same pressure code SCAN_STILL
+ * times more, since the noise of a sensor is 40 codes and more. A reading whose last sixteen bits are ones, far from the sensor's last one,
+ * comes from a sensor that lost count of the clocks and stopped sending: see scan.c. readings.h has the other reasons that make a reading
  * or a sensor implausible.
  *
  * Scattered NACKs of single reads leave 0.4, 1.0, 2.8, 10 and 28 % of 186 frames a second incomplete at 0.3, 1, 3, 10
@@ -21,9 +22,9 @@
  *
  * Temperatures are converted twice a second, less often while they are constant. Where the requested rate leaves a
  * pause, that is done in the pause before a frame. Otherwise it takes the place of a frame, at most one in 600 at OSR
- * 256 and one in 25 at OSR 8192. That frame goes out at its time too, with the pressures of the one before, and marked
- * as held. All ones are no reading. A sensor's last temperature is forgotten when it is admitted again. Its next
- * temperature is the next conversion. */
+ * 256 and one in 25 at OSR 8192, and one in 33 while pressures move (readings.h). That frame goes out at its time too, with the pressures
+ * of the one before, and marked as held. All ones are no reading. A sensor's last temperature is forgotten when it is admitted again. Its
+ * next temperature is the next conversion. */
 #pragma once
 
 #include "array_bus/array_bus.h"
@@ -104,7 +105,8 @@ struct scan_conversion {
 struct scan_slot {
   struct scan_conversion conversion;
   sensor_map good;               /* bitmap: the code is a measurement */
-  sensor_map zero;               /* bitmap: has read 0 since the last one that was taken. Of a frame */
+  sensor_map still;              /* bitmap: and that of the one before. Of a frame */
+  sensor_map zero;               /* bitmap: the code was 0. Of a frame */
   sensor_map prom_changed;       /* bitmap: another sensor than before. Of a temperature */
   sensor_map returned;           /* bitmap: admitted again, perhaps after long. Of a temperature */
   uint32_t code[FT_MAX_SENSORS]; /* [sensor] 24-bit */
@@ -115,6 +117,8 @@ enum scan_slot_state {
   SCAN_SLOT_FULL,    /* the event context may overwrite it */
   SCAN_SLOT_CLAIMED, /* the main context reads it */
 };
+
+#define SCAN_STILL 5
 
 struct scan {
   const struct array_bus *bus;
@@ -142,12 +146,12 @@ struct scan {
   bool wants_admission; /* a sensor is there that is not admitted, or a suspect */
   uint64_t recovery_delay_us;
   uint32_t frame_number;
-  sensor_map void_next;    /* bitmap: the next reading does not count */
-  sensor_map was_zero;     /* bitmap: the last reading was 0 */
-  sensor_map zero_seen;    /* bitmap: one was, of either kind, since the slot of the frame was filled */
-  sensor_map missed_once;  /* bitmap: the last reading was not acknowledged, ... */
-  sensor_map missed_twice; /* ... nor the one before */
-  sensor_map returned;     /* bitmap: admitted, and was not before */
+  sensor_map void_next;         /* bitmap: the next reading does not count */
+  sensor_map was_zero;          /* bitmap: the last reading was 0 */
+  sensor_map still[SCAN_STILL]; /* [n] bitmap: the same code as in the n + 1 frames before */
+  sensor_map missed_once;       /* bitmap: the last reading was not acknowledged, ... */
+  sensor_map missed_twice;      /* ... nor the one before */
+  sensor_map returned;          /* bitmap: admitted, and was not before */
 
   /* Written by the event context, readable from any. */
   struct scan_map present;  /* bitmap: acknowledged at the last attempt */
@@ -188,10 +192,6 @@ static inline bool scan_has_news(const struct scan *scan) {
 /* Main context. True: *frame, which must still hold the frame before, holds a new one. False:
  * nothing new (a temperature may have been used up). */
 bool scan_take(struct scan *scan, struct frame *frame);
-
-/* Main context. There is reason to look at the temperatures: their next conversion comes within 0.1
- * s. If it shows that a sensor has lost its state, it asks for another by itself. */
-void scan_ask_temperature(struct scan *scan);
 
 /* Main context. Resting: what is under way ends, then there is no conversion and nothing on the bus
  * until the rest ends, 10 ms later at most. */

@@ -2,6 +2,8 @@
 #include "port/divide.h"
 #include "scan/readings.h"
 
+#include <string.h>
+
 /* No change between two readings: 15 Pa, and 3.5 standard deviations of the noise at OSR 256. */
 #define TEMPERATURE_STILL_cC 6
 /* MS5837-02BA datasheet, page 7: the range of the calculation. */
@@ -9,21 +11,14 @@
 #define TEMPERATURE_MAX_cC 8500
 /* Fewer cannot outvote one. */
 #define VOTERS_MIN 3
+#define NO_MIDDLE INT32_MIN
 /* A sensor that is in doubt for ever must not cost a frame in ten. */
 #define HASTY_DOUBTS_MAX 4
 
 static bool within(int32_t value, int32_t limit) { return value >= -limit && value <= limit; }
 
-static int16_t clamped_i16(int32_t value) { return (int16_t)(value > INT16_MAX ? INT16_MAX : value < INT16_MIN ? INT16_MIN : value); }
-
-/* What the temperatures of the array show about one of them. */
-struct company {
-  int32_t middle_cC; /* of them now */
-  bool votes;
-};
-
-static struct company keep_company(const struct readings *readings, uint8_t sensor_count, sensor_map good, const int16_t now_cC[]) {
-  struct company company = {.votes = false};
+/* Of the temperatures of the array now, or NO_MIDDLE. */
+static int32_t find_middle(const struct readings *readings, uint8_t sensor_count, sensor_map good, const int32_t now_cC[]) {
   int32_t values[FT_MAX_SENSORS];
   int count = 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
@@ -33,18 +28,14 @@ static struct company keep_company(const struct readings *readings, uint8_t sens
       values[count++] = now_cC[k];
     }
   }
-  if (count >= VOTERS_MIN) {
-    company.votes = true;
-    company.middle_cC = apart_median(values, count);
-  }
-  return company;
+  return count >= VOTERS_MIN ? apart_median(values, count) : NO_MIDDLE;
 }
 
 /* Whether to use a temperature that something speaks against. */
-static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const struct company *company, bool is_late) {
+static bool settle(struct readings *readings, uint8_t k, int32_t now_cC, int32_t middle_cC, int32_t most_cC) {
   sensor_map bit = sensor_bit(k);
   bool possible = now_cC >= TEMPERATURE_MIN_cC && now_cC <= TEMPERATURE_MAX_cC;
-  bool near = possible && (!company->votes || within(now_cC - company->middle_cC, READINGS_TEMPERATURE_NEAR_cC));
+  bool near = possible && (middle_cC == NO_MIDDLE || within(now_cC - middle_cC, READINGS_TEMPERATURE_NEAR_cC));
   bool agrees = (readings->doubted & bit) && within(now_cC - readings->doubted_cC[k], READINGS_TEMPERATURE_STEP_MAX_cC);
   bool use;
   bool insists; /* reports it again, and it cannot be */
@@ -54,10 +45,9 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const s
     use = possible && (kept || (agrees && pardoned));
     insists = !use && (agrees || (known && !pardoned));
   } else {
-    const int32_t most_cC = is_late && !readings->jolted ? READINGS_TEMPERATURE_NEAR_cC : READINGS_TEMPERATURE_STEP_MAX_cC;
     use = within(now_cC - readings->thermal[k].first_order_cC, most_cC);
     insists = !use && (agrees || readings->jolted);
-    readings->jolted |= insists && readings->jolted ? bit : 0;
+    readings->has_last &= insists && readings->moved ? ~bit : ~(sensor_map)0; /* no evidence any more */
   }
   if (!use) {
     readings->suspects |= insists ? bit : 0;
@@ -72,7 +62,7 @@ static bool settle(struct readings *readings, uint8_t k, int16_t now_cC, const s
 static void forget(struct readings *readings, const struct readings_temperature *taken) {
   const sensor_map sensors = taken->prom_changed | taken->returned | ~taken->admitted;
   const sensor_map reset = readings->suspects & sensors;
-  readings->restored |= reset & ~readings->jolted; /* before a jolt it had its state */
+  readings->restored |= reset & readings->has_thermal & readings->has_last; /* the others had their state until they moved */
   readings->pardoned = (readings->pardoned & ~sensors) | (taken->is_patient ? reset & ~readings->has_thermal : 0);
   readings->known = (readings->known | readings->has_thermal) & ~(taken->prom_changed | readings->strange);
   readings->known &= taken->is_soon ? ~(sensor_map)0 : taken->admitted;
@@ -86,7 +76,6 @@ static void forget(struct readings *readings, const struct readings_temperature 
   readings->was_low &= ~sensors;
   readings->alone &= ~sensors;
   readings->suspects &= ~sensors;
-  readings->jolted &= ~sensors;
 }
 
 /* Sensors whose PROM has a wrong CRC against the middle of all. */
@@ -141,19 +130,6 @@ static void average(struct readings *readings, uint8_t sensor_count, sensor_map 
   }
 }
 
-/* Whether any temperature needs more than a look at its own last one. */
-static bool is_unusual(const struct readings *readings, uint8_t sensor_count, sensor_map good, const int16_t now_cC[]) {
-  if (good & (~readings->has_thermal | readings->doubted | readings->strange)) {
-    return true;
-  }
-  for (uint8_t k = 0; k < sensor_count; k++) {
-    if ((good & sensor_bit(k)) && !within(now_cC[k] - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_STEP_MAX_cC)) {
-      return true;
-    }
-  }
-  return false;
-}
-
 uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count, const struct readings_temperature *taken) {
   forget(readings, taken);
   readings->renewed |= taken->prom_changed;
@@ -162,41 +138,45 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     prove(readings, sensor_count);
   }
 
-  int16_t now_cC[FT_MAX_SENSORS] = {0};
+  int32_t now_cC[FT_MAX_SENSORS] = {0};
   for (uint8_t k = 0; k < sensor_count; k++) {
-    now_cC[k] = clamped_i16(ms58xx_first_order_cC(&taken->prom[k], taken->code[k]));
+    now_cC[k] = ms58xx_first_order_cC(&taken->prom[k], taken->code[k]);
   }
-  const bool unusual = is_unusual(readings, sensor_count, taken->good, now_cC);
-  struct company company;
-  if (unusual) {
-    company = keep_company(readings, sensor_count, taken->good, now_cC);
-  }
+  const bool moved = readings->moved;
+  const int32_t step_max_cC = taken->step_max_cC; /* more than usual after long */
+  const bool is_less = moved && step_max_cC > READINGS_MOVED_cC && step_max_cC <= READINGS_TEMPERATURE_STEP_MAX_cC;
+  const int32_t most_cC = is_less ? READINGS_MOVED_cC : step_max_cC;
+  const int32_t middle_cC = find_middle(readings, sensor_count, taken->good, now_cC);
   uint32_t news = 0;
+  sensor_map left = readings->counted & (readings->still | ~taken->good); /* in doubt as before */
   for (uint8_t k = 0; k < sensor_count; k++) {
     const sensor_map bit = sensor_bit(k);
     if (!(taken->good & bit)) {
       continue;
     }
-    if (unusual && !settle(readings, k, now_cC[k], &company, taken->is_late)) {
+    if (!settle(readings, k, now_cC[k], middle_cC, most_cC)) {
       news |= READINGS_ASK_AGAIN;
+      left |= bit;
       continue;
     }
     struct ms58xx_thermal *thermal = &readings->thermal[k];
     const bool had = readings->has_thermal & bit;
-    if (!had || !within(now_cC[k] - thermal->first_order_cC, TEMPERATURE_STILL_cC)) {
-      news |= READINGS_MOVED;
-    }
+    const bool still = within(now_cC[k] - thermal->first_order_cC, TEMPERATURE_STILL_cC);
+    news |= had && still ? 0 : READINGS_MOVED;
+    left |= had && !still ? bit : 0;
     ms58xx_compensate_temperature(&taken->prom[k], taken->code[k], had ? thermal->branch : MS58XX_BRANCH_UNKNOWN, thermal);
     readings->doubted &= ~bit;
     readings->has_thermal |= bit;
   }
-  /* What they read before is no evidence any more. */
-  readings->has_last &= ~(readings->jolted & (readings->suspects | readings->zero));
-  readings->jolted &= ~taken->good | readings->suspects;
-  news |= readings->jolted & ~readings->suspects ? READINGS_ASK_AGAIN : 0;
   readings->alike &= taken->admitted & ~taken->prom_changed;
+  readings->jolted = false;
+  readings->moved = moved && left && readings->doubts_in_a_row < HASTY_DOUBTS_MAX;
   readings->doubtful = taken->prom_bad | readings->doubted | readings->strange | readings->apart | compare(readings, sensor_count);
+  readings->doubtful |= readings->moved ? ~(sensor_map)0 : 0;
   average(readings, sensor_count, taken->admitted);
+  memcpy(readings->vouched_Pa_q10, readings->last_Pa_q10[readings->newest], sizeof readings->vouched_Pa_q10);
+  readings->frames = 0;
+  news |= readings->moved ? READINGS_ASK_AGAIN : 0;
   if (!(news & READINGS_ASK_AGAIN)) {
     readings->doubts_in_a_row = 0;
   } else if (readings->doubts_in_a_row < HASTY_DOUBTS_MAX) {

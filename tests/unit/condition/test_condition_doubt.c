@@ -20,6 +20,19 @@ TEST(test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt) {
   }
 }
 
+/* No release leaves a sensor so far below its zero. */
+TEST(test_a_contact_beside_a_sensor_far_below_its_zero_is_in_doubt) {
+  begin_calm(periods_us[0]);
+  press(20000 * Pa);
+  run_s(1);
+  frame.pressure_Pa_q10[14] -= 4500 * Pa;
+  run(1);
+  TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+  frame.pressure_Pa_q10[14] -= 1000 * Pa;
+  run(1);
+  TEST_ASSERT_TRUE(conditioned.zero_doubtful);
+}
+
 static void press_in_steps(int32_t from, int32_t to, float seconds, float then_s) {
   int count = frames_in(seconds);
   for (int i = 1; i <= count; i++) {

@@ -40,6 +40,9 @@ TEST(test_one_apart_is_known_from_the_first_frame_on) {
   frame.pressure_Pa_q10[ODD] -= 2400 * 1024;
   expect_next(2000000, 1u << ODD);
   read_all(25000); /* no air has that */
+  frame.unsettled = 1u << ODD;
+  expect_next(2000000, 1u << ODD);
+  frame.unsettled = 0;
   expect_next(2000000, ALL);
 }
 

@@ -147,10 +147,11 @@ TEST(test_other_warnings_keep_the_history) {
     fit.flags = GOOD_FIT | warnings[i];
     TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID | fit.flags, update());
   }
-  input.unsettled = 2; /* one such frame is passed over */
-  TEST_ASSERT_BITS_LOW(CONTACT_FLAG_SLIP_VALID, update());
-  input.unsettled = 0;
-  TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SLIP_VALID, update());
+  static const sensor_map unsettled[] = {2, 0, 0x7FFF, 0x7FFF, 0x7FFF, 0}; /* one is passed over, and all of the array */
+  for (size_t i = 0; i < sizeof unsettled / sizeof unsettled[0]; i++) {
+    input.unsettled = unsettled[i];
+    TEST_ASSERT_EQUAL(!unsettled[i], (update() & CONTACT_FLAG_SLIP_VALID) != 0);
+  }
 }
 
 TEST(test_saturation_and_lower_bound) {

@@ -62,6 +62,14 @@ TEST(test_a_frame_and_its_bus_time) {
   TEST_ASSERT_EQUAL_UINT32(0, array.early_reads);
 }
 
+TEST(test_no_sensor_has_the_same_code_twice_in_a_row) {
+  memset(array.d1, 0, sizeof array.d1);
+  for (uint32_t before = 0, n = 0; n < 5; n++, before = code(3)) {
+    TEST_ASSERT_EQUAL_INT(FT_OK, frame());
+    TEST_ASSERT_TRUE(code(3) != before && (n == 0 || code(3) - before + 1 <= 2));
+  }
+}
+
 static double ramp_Pa(void *context, unsigned sensor, uint64_t t_us) {
   (void)context;
   return 100000.0 + 1000.0 * sensor + (double)t_us / 1000.0;

@@ -63,10 +63,15 @@ static void answer_prom(struct fake_bus *fake, uint8_t command, struct array_bus
   }
 }
 
+uint32_t fake_d1(const struct fake_bus *fake, uint8_t k) {
+  return (fake->d1[k] & 0xFF) == 0xFF || fake->frozen >> k & 1u ? fake->d1[k] : fake->d1[k] + fake->noise;
+}
+
 static void answer_adc(struct fake_bus *fake, struct array_bus_result *result) {
   bool temperature = (fake->converted & 0xF0) == 0x50;
+  fake->noise ^= !temperature;
   for (uint8_t k = 0; k < fake->sensor_count; k++) {
-    uint32_t code = temperature ? fake->d2[k] : fake->d1[k];
+    uint32_t code = temperature ? fake->d2[k] : fake_d1(fake, k);
     if (!fake->converted || fake->zero_next >> k & 1u) {
       code = 0;
     }

@@ -27,6 +27,7 @@ struct fake_bus {
   uint32_t misread_prom;      /* bitmap: one bit of word 3 is flipped ... */
   int misread_passes;         /* ... in this many passes to come */
   uint32_t zero_next;         /* bitmap: the next ADC reading is 0 */
+  uint32_t frozen;            /* bitmap: all pressures have the same code */
   int fail_at;                /* operations until one fails; -1: none */
   enum ft_status fail_with;   /* what it answers */
   enum ft_status recovery_is; /* what every recovery answers */
@@ -38,12 +39,16 @@ struct fake_bus {
   bool running;
   uint64_t powered_us, ready_us; /* sensors reset; conversion over */
   uint8_t converted;             /* command of the last conversion; 0: none */
+  uint32_t noise;                /* 0 or 1: of the last pressures */
   int misuses;                   /* what the datasheet forbids */
   const char *misuse;
 };
 
 /* Of a read, until the sensors have its command */
 #define FAKE_READ_LEAD_us 44u
+
+/* The last code of a pressure. */
+uint32_t fake_d1(const struct fake_bus *fake, uint8_t k);
 
 /* A healthy array: sensors with different PROMs at about 1 bar and 25 degC. */
 void fake_bus_init(struct fake_bus *fake, struct array_bus *bus, uint8_t sensor_count);

@@ -103,7 +103,7 @@ int find_entry(int from, uint8_t command, enum fake_operation operation) {
 int32_t expected_Pa_q10(uint8_t k) {
   struct ms58xx_thermal thermal;
   ms58xx_compensate_temperature(&fake.prom[k], fake.d2[k], MS58XX_BRANCH_UNKNOWN, &thermal);
-  return ms58xx_compensate_pressure(&thermal, fake.d1[k]);
+  return ms58xx_compensate_pressure(&thermal, fake_d1(&fake, k));
 }
 
 void assert_good_frame(sensor_map valid) {

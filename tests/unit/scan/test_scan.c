@@ -44,6 +44,7 @@ TEST(test_frame_contents) {
 
 TEST(test_saturation_is_reported_at_the_end_of_the_range) {
   next_frame();
+  fake.frozen = DISTURBED_BIT;
   uint32_t low = 0;
   uint32_t high = 0xFFFFFF;
   while (high - low > 1) { /* the greatest code that passes */
