@@ -370,7 +370,7 @@ class Looks(PageTest):
 
     def paused(self, recording=None, steps=MOMENT_STEPS):
         """A page that shows the same moment of the same recording; without one: of a lime that slips, simulated."""
-        recording = recording or self.recorded("lime.csv", self.scenario("slip", "--indenter", "lime", "--effects=gain=10", "--seconds", 12))
+        recording = recording or self.recorded("lime.csv", self.scenario("slip", "--indenter=lime", "--effects=gain=10", "--seconds", 12))
         page = self.open(before=TEN_TIMES)
         page.give("input[type=file]", recording)
         page.until("fingertip.fingertips[0]?.state === 'closed'")
