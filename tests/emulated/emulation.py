@@ -54,7 +54,9 @@ def write_scenario(path, *rows, sensors=15):
     names = ["t_s", *files.TRUTH_COLUMNS, *(f"s{k}_Pa" for k in range(sensors))]
     truth = [0] * len(files.TRUTH_COLUMNS)
     lines = [[t_s, *truth, *(pressures * sensors if len(pressures) == 1 else pressures)] for t_s, *pressures in rows or [(0, 0)]]
-    path.write_text("\n".join(["# fingertip-scenario 1", f"# sensors: {sensors}", *(",".join(map(str, line)) for line in [names, *lines])]) + "\n")
+    path.write_text(
+        "\n".join(["# fingertip-scenario 1", f"# sensors: {sensors}", *(",".join(map(str, line)) for line in [names, *lines])]) + "\n"
+    )
     return path
 
 

@@ -65,7 +65,10 @@ class ThirdBoard(unittest.TestCase):
     def test_it_is_built_and_runs_on_its_own_pins(self):
         run("cmake", "--build", self.build, "--target", f"fingertip-{THIRD}")
         emulator, image = self.tree / "host_tools/simulation/emulator/main.mjs", self.build / f"fingertip-{THIRD}.bin"
-        rest, commands = write_scenario(self.tree / "build/rest.csv", sensors=SENSORS), [(0.46, "info"), (0.47, "stream", "contact,raw,health")]
+        rest, commands = (
+            write_scenario(self.tree / "build/rest.csv", sensors=SENSORS),
+            [(0.46, "info"), (0.47, "stream", "contact,raw,health")],
+        )
         done = Run(TOOLS, self.build, "third", THIRD, rest, 0.8, commands, emulator=emulator, image=image)
         self.assertEqual(done.report["warnings"], [])
         self.assertEqual(done.recording.metadata["board"], THIRD)

@@ -121,7 +121,6 @@ def figures(results, seed):
     """fit.json. Shipped: with the iterations that the firmware makes; else with those that reach the optimum. Masked: one random sensor, or
     the peak sensor, is unusable for the reference too."""
     r = results
-    libraries = ("ceres_reused", "tiny_solver", "cminpack")
     found = {
         "observable_presses": r.sum("fit", USUAL, "presses"),
         "p99_9_um": r.worst("fit", USUAL, "p999_um"),
@@ -141,12 +140,9 @@ def figures(results, seed):
         "good_flagged_percent_d": r.percent_of_all("fit", USUAL, "D", "good_flagged"),
         "cold_cycles": r.cycles_max("grid", [BUILT]),
         "masked_cycles": r.cycles_max("masked", BUILT_MASKS),
-        "with_outlier_search_cycles": r.cycles_max("fit", [BUILT, *BUILT_MASKS]),
-        "general_cycles": r.cycles_max("general", [USUAL]),
         "speed_vs_ceres": r.host["ceres_reused"]["ratio"],
         "speed_vs_tinysolver": r.host["tiny_solver"]["ratio"],
         "speed_vs_cminpack": r.host["cminpack"]["ratio"],
-        "host_p99_9_um": {name: r.host[name]["p999_um"] for name in (errors.HOST_KERNEL, *libraries)},
         "seed": seed,
         "processor": errors.processor(),
     }

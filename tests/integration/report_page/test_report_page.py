@@ -4,7 +4,6 @@ import base64
 import html.parser
 import json
 import pathlib
-import subprocess
 import sys
 import tempfile
 import unittest
@@ -18,6 +17,7 @@ import fit  # noqa: E402
 import rate  # noqa: E402
 import shear  # noqa: E402
 import grasp  # noqa: E402
+import page  # noqa: E402
 import truth  # noqa: E402
 import validation  # noqa: E402
 from presentation import goal_table_md, judge  # noqa: E402
@@ -146,13 +146,8 @@ class Page(unittest.TestCase):
                 (self.folder / table).write_text('{"cases": [{"case_of_json": "hard"}]}')
         return every
 
-    def page(self, folder):
-        return subprocess.run([sys.executable, REPORT / "shared/page.py", "-o", folder], capture_output=True, text=True)
-
     def read(self):
-        done = self.page(self.folder)
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        self.assertEqual(done.stdout, f"page: {self.folder / 'index.html'}\n")
+        self.assertEqual(page.write(self.folder), self.folder / "index.html")
         return Reader((self.folder / "index.html").read_text(encoding="utf-8"))
 
     def test_every_key_is_in(self):
@@ -256,11 +251,6 @@ class Page(unittest.TestCase):
             self.assertNotIn(word, text)
         self.assertIn("prefers-color-scheme: dark", text)
         self.assertIn('name="viewport" content="width=device-width', text)
-
-    def test_a_wrong_folder_is_one_line(self):
-        done = self.page(self.folder / "none")
-        self.assertEqual(done.returncode, 1)
-        self.assertEqual(done.stderr, f"page.py: {self.folder / 'none'}: there is no such folder; run a report first\n")
 
 
 if __name__ == "__main__":
