@@ -33,8 +33,8 @@ class Bench extends CrashBench {
 }
 
 /** A bench whose streams have come for some time. */
-function streaming(name, ms = 0) {
-  const bench = new Bench(name);
+function streaming(name, ms = 0, options = {}) {
+  const bench = new Bench(name, options);
   bench.stream();
   bench.run(ms);
   return bench;
@@ -43,8 +43,7 @@ function streaming(name, ms = 0) {
 /** Something that was in no crash does not read as one. */
 test('a first start tells of no crash, whatever is in SRAM', () => {
   for (let seed = 1; seed < 4; seed++) {
-    const bench = new Bench('pico_mux', { seed });
-    bench.stream();
+    const bench = streaming('pico_mux', 0, { seed });
     assert.equal(bench.crash().kind, 0);
     assert.equal(bench.resets(), 0);
     bench.end();
@@ -54,8 +53,7 @@ test('a first start tells of no crash, whatever is in SRAM', () => {
 {
   const name = 'pico_parallel';
   test(`${name}: a jump into the guarded page is a hard fault with its registers`, () => {
-    const bench = streaming(name);
-    bench.run(300);
+    const bench = streaming(name, 300);
     const { core } = bench.machine.chip;
     bench.until(() => core.waiting && core.IPSR === 0, 10, 'sleep');
     const sp = core.registers[13];
@@ -139,9 +137,8 @@ test('a first start tells of no crash, whatever is in SRAM', () => {
   });
 
   test(`${name}: interrupts that are off for good: the next start tells what it knows`, () => {
-    const bench = streaming(name);
+    const bench = streaming(name, 100);
     const { chip } = bench.machine;
-    bench.run(100);
     bench.patch('scan_take', '72b6' + STAND_STILL); // cpsid i
     const at_us = chip.timer.count_us;
     const took_ms = bench.untilReset();
@@ -155,13 +152,12 @@ test('a first start tells of no crash, whatever is in SRAM', () => {
 
   /** While no host hears it, or none comes, nothing is stuck. */
   test(`${name}: a bus that sleeps, a cable that is out, a host that is silent or does not read are no reason`, () => {
-    const bench = new Bench(name, {
+    const bench = streaming(name, 0, {
       faults: [
         { type: 'usb_unplug', from_s: 2.5, to_s: 5 },
         { type: 'host_stall', from_s: 5.5, to_s: 7 },
       ],
     });
-    bench.stream();
     bench.machine.host.suspend();
     bench.run(1500);
     bench.machine.host.resume();
@@ -176,9 +172,7 @@ for (const name of ['pico_mux', 'pico_parallel']) {
     // The last words mostly come amid an interrupt of the bus on pico_mux, and tell that: other instants, until they do not.
     let told = 0;
     for (let from_ms = 100; told === 0 && from_ms < 150; from_ms += 1.37) {
-      const bench = new Bench(name);
-      bench.stream();
-      bench.run(from_ms);
+      const bench = streaming(name, from_ms);
       bench.patch('scan_take', STAND_STILL);
       const took_ms = bench.untilReset();
       t.diagnostic(`${took_ms.toFixed(0)} ms`);
@@ -218,18 +212,16 @@ for (const name of ['pico_mux', 'pico_parallel']) {
 }
 
 test('the slowest rate, and sensors that are all dead, are no reason', () => {
-  const bench = new Bench('pico_mux', {
+  const bench = streaming('pico_mux', 0, {
     faults: Array.from({ length: 15 }, (_, sensor) => ({ type: 'sensor_dead', sensor, from_s: 1, to_s: 3 })),
   });
-  bench.stream();
   bench.machine.client.write(bench.encoded('rate', '0.1'));
   bench.run(5000);
   assert.equal(bench.machine.reboots, 0);
 });
 
 test('two crashes: the last is told, both are counted, and power-off forgets them', () => {
-  const bench = new Bench('pico_mux', { faults: [{ type: 'power_cut', from_s: 3, to_s: 3.1 }] });
-  bench.stream();
+  const bench = streaming('pico_mux', 0, { faults: [{ type: 'power_cut', from_s: 3, to_s: 3.1 }] });
   bench.patch('scan_take', STAND_STILL);
   bench.untilReset();
   assert.equal(bench.crash().kind, WATCHDOG);

@@ -17,15 +17,17 @@ const BOARDS = ['pico_mux', 'pico_parallel'];
 // Flags of a contact (contact_flags.h)
 const [CONTACT, TARED] = [1 << 0, 1 << 5];
 
-class Bench extends ImageBench {
-  constructor(name, options) {
-    super(images, { fingertip, command_frame }, name, options);
-  }
+const benchOf = (name, options) => new ImageBench(images, { fingertip, command_frame }, name, options);
+
+/** A bench whose streams have come. */
+function streaming(name, options) {
+  const bench = benchOf(name, options);
+  bench.stream();
+  return bench;
 }
 
 test('a change of the suspend state that is told late does not close the port', () => {
-  const bench = new Bench('pico_parallel', { faults: [{ type: 'usb_late_resume', from_s: 0 }] });
-  bench.stream();
+  const bench = streaming('pico_parallel', { faults: [{ type: 'usb_late_resume', from_s: 0 }] });
   const { host } = bench.machine;
   host.suspend();
   bench.run(20);
@@ -40,8 +42,7 @@ test('a change of the suspend state that is told late does not close the port', 
 
 test('an abort of the I2C controller, whose FIFO stays flushed until it is told, costs no recovery of the bus', () => {
   const faults = Array.from({ length: 20 }, (_, i) => ({ type: 'sensor_nack', sensor: (4 * i) % 15, from_s: 0.1 + 0.0103 * i }));
-  const bench = new Bench('pico_mux', { faults });
-  bench.stream();
+  const bench = streaming('pico_mux', { faults });
   bench.run(320);
   const { bus_recoveries, bus_timeouts, bus_nacks } = bench.health();
   assert.ok(bus_nacks > 5, `${bus_nacks}`);
@@ -53,8 +54,7 @@ for (const name of BOARDS) {
   for (const [type, limit_ms] of Object.entries({ usb_deaf: 1000, usb_dead: 1500 })) {
     test(`${name}: a USB controller hung as by erratum E15 (${type}) is reset and comes back`, (t) => {
       const from_s = 0.2;
-      const bench = new Bench(name, { faults: [{ type, from_s }] });
-      bench.stream();
+      const bench = streaming(name, { faults: [{ type, from_s }] });
       bench.assertStreams(1000 * from_s - bench.now_ms);
       bench.until(() => !bench.machine.host.configured, 10, 'loss of the device');
       const back_ms = bench.stream(limit_ms) - 1000 * from_s;
@@ -71,7 +71,7 @@ for (const name of BOARDS) {
 function starts(what, faults, reboots, limit_ms) {
   for (const name of BOARDS) {
     test(`${name}: ${what}`, (t) => {
-      const bench = new Bench(name, { faults });
+      const bench = benchOf(name, { faults });
       const back_ms = bench.stream(limit_ms);
       t.diagnostic(`streams after ${back_ms.toFixed(0)} ms`);
       assert.ok(back_ms < limit_ms, `${back_ms}`);
@@ -90,7 +90,7 @@ starts('PLLs that lock after 60 ms', until('pll_late', 60), 0, 130);
 starts('PLLs that lock after 400 ms', until('pll_late', 400), 2, 700);
 
 test('what a debugger left in the clock generators does not stay', () => {
-  const bench = new Bench('pico_mux');
+  const bench = benchOf('pico_mux');
   const { clocks, core } = bench.machine.chip;
   bench.until(() => clocks.sysHz === 125e6, 20, 'clock');
   for (const generator of [clocks.ref, clocks.sys, clocks.usb]) generator.div = 0x200;
@@ -103,7 +103,7 @@ test('what a debugger left in the clock generators does not stay', () => {
 });
 
 test('a reset of the first core alone ends the second before its code is copied over', () => {
-  const bench = new Bench('pico_mux');
+  const bench = benchOf('pico_mux');
   const { chip } = bench.machine;
   bench.until(() => chip.second.state === 'runs', 50, 'second core');
   chip.sram.set(chip.flash.subarray(0, 256), 0x41f00); // as the boot ROM does
@@ -117,8 +117,7 @@ test('a reset of the first core alone ends the second before its code is copied 
 for (const name of BOARDS) {
   test(`${name}: the start of a frame is seen at once, whatever the sensors need`, (t) => {
     const faults = [{ type: 'sensor_dead', sensor: 3, from_s: 0.2, to_s: 0.25 }];
-    const bench = new Bench(name, { faults });
-    bench.stream();
+    const bench = streaming(name, { faults });
     bench.run(1500); // all PROMs are read and judged again
     const slowest_us = bench.machine.chip.usbCtrl.slowestSof_ns / 1000;
     t.diagnostic(`${slowest_us.toFixed(1)} us`);
@@ -128,8 +127,7 @@ for (const name of BOARDS) {
 }
 
 test('sensors that acknowledge as soon as SCL falls cost no arbitration', () => {
-  const bench = new Bench('pico_mux', { faults: [3, 7, 14].map((sensor) => ({ type: 'sensor_fast', sensor, from_s: 0 })) });
-  bench.stream();
+  const bench = streaming('pico_mux', { faults: [3, 7, 14].map((sensor) => ({ type: 'sensor_fast', sensor, from_s: 0 })) });
   bench.run(200);
   const { frames_incomplete, bus_recoveries, bus_timeouts } = bench.health();
   assert.deepEqual([frames_incomplete, bus_recoveries, bus_timeouts], [0, 0, 0]);
@@ -138,8 +136,7 @@ test('sensors that acknowledge as soon as SCL falls cost no arbitration', () => 
 
 for (const name of BOARDS) {
   test(`${name}: the Pico's regulator is held in its quiet mode`, () => {
-    const bench = new Bench(name);
-    bench.stream();
+    const bench = streaming(name);
     assert.equal((bench.machine.chip.pins.high >>> 23) & 1, 1);
     bench.end();
   });
@@ -152,7 +149,7 @@ for (const [name, revision, faults] of [
   ['pico_parallel', 2, [{ type: 'usb_busy_hub', from_s: 0 }]],
 ]) {
   test(`${name}: a chip of revision B${revision} enumerates${faults.length ? ' behind a busy hub' : ''}`, (t) => {
-    const bench = new Bench(name, { revision, faults, fastEnumeration: false });
+    const bench = benchOf(name, { revision, faults, fastEnumeration: false });
     t.diagnostic(`streams after ${bench.stream(500).toFixed(0)} ms`);
     bench.assertStreams(100);
     assert.equal(bench.end().usb.enumerations, 1);
@@ -162,12 +159,12 @@ for (const [name, revision, faults] of [
 for (const name of BOARDS) {
   for (const type of ['power_cut', 'chip_reset']) {
     test(`${name}: a start that is interrupted (${type}) at any time is followed by one that succeeds, whatever is in SRAM`, (t) => {
-      const whole_ms = new Bench(name).stream();
+      const whole_ms = benchOf(name).stream();
       let [starts, slowest_ms] = [0, 0];
       for (let at_ms = Number(step_us) / 1000; at_ms < whole_ms + 5; at_ms += Number(step_us) / 1000) {
         starts += 1;
         const to_ms = at_ms + 3;
-        const bench = new Bench(name, { seed: starts, faults: [{ type, from_s: at_ms / 1000, to_s: to_ms / 1000 }] });
+        const bench = benchOf(name, { seed: starts, faults: [{ type, from_s: at_ms / 1000, to_s: to_ms / 1000 }] });
         bench.run(to_ms);
         slowest_ms = Math.max(slowest_ms, bench.stream() - to_ms);
         bench.run(20);
@@ -184,7 +181,7 @@ for (const name of BOARDS) {
 
 for (const name of BOARDS) {
   test(`${name}: while the bus sleeps sensors and clocks do too, and wake up in time`, (t) => {
-    const bench = new Bench(name);
+    const bench = benchOf(name);
     const { host } = bench.machine;
     const { chip, board } = bench.machine;
     const steady = () => (chip.pins.high >>> 23) & 1;
@@ -219,8 +216,7 @@ for (const name of BOARDS) {
 test('what changed while the bus slept for long is no contact', () => {
   const row = (t_s, Pa) => `${t_s},0,0,0,0,0,0,0,${new Array(15).fill(Pa).join(',')}\n`;
   const scenario = parseScenario(`# fingertip-scenario 1\n${HEADER}\n${row(0, 0)}${row(1, 0)}${row(60, 800)}`, 'weather.csv');
-  const bench = new Bench('pico_parallel', { scenario });
-  bench.stream();
+  const bench = streaming('pico_parallel', { scenario });
   bench.run(200);
   assert.equal(bench.flags() & (CONTACT | TARED), TARED);
   bench.machine.host.suspend();

@@ -47,15 +47,6 @@ class Emulator:
         return self.power_on_us + self.report["device_time_zero_s"] * 1e6 + device_us / (1 + self.report["clock_ppm"] * 1e-6)
 
 
-def record_all(world, emulators, path, seconds):
-    ports = ":".join(str(each.port) for each in emulators)
-    world.tool("record", path, "--all", "--seconds", seconds, env={**os.environ, "FINGERTIP_PORT": ports})
-
-
-def recordings_in(path):
-    return [files.read_recording(path, serial=serial) for serial in CLOCKS_ppm]
-
-
 def worst_us(emulators, recordings, from_s=-np.inf, to_s=np.inf):
     """Of each row against the other's latest: how far apart the two are that truly are of one moment."""
     host_zero_us = float(recordings[0].metadata["host_zero_us"])
@@ -82,11 +73,12 @@ class OneWire(unittest.TestCase):
                 Emulator(world, TOOLS.image, folder, serial, folder / "scenario.csv", "--sync-strobe", STROBE_ms) for serial in CLOCKS_ppm
             ]
             cls.said = [world.tool("set", "--port", each.port, f"rate={RATE_Hz}", "sync=in") for each in cls.emulators]
-            record_all(world, cls.emulators, folder / "both.mcap", RECORDED_s)
+            ports = {"FINGERTIP_PORT": ":".join(str(each.port) for each in cls.emulators)}
+            world.tool("record", folder / "both.mcap", "--all", "--seconds", RECORDED_s, env={**os.environ, **ports})
             world.tool("convert", folder / "both.mcap", cls.file)
             for each in cls.emulators:
                 each.stop()
-        cls.recordings = recordings_in(cls.file)
+        cls.recordings = [files.read_recording(cls.file, serial=serial) for serial in CLOCKS_ppm]
 
     @classmethod
     def tearDownClass(cls):

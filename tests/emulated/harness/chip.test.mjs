@@ -301,7 +301,6 @@ test('a reset of its block takes the lock of a PLL', () => {
   assert.ok(run(restartPll('SET(0x4000c000) = 1 << 12; unreset(1 << 12);')).finished);
 });
 failsWith('clk_sys from a dead PLL', main('REG(0x4000803c) = 1;'), /clk_sys switched to a source that does not run/);
-failsWith('wrong tick divider', main('start_clocks(); REG(0x4005802c) = 0x200 | 10;'), /must be 1 MHz/);
 failsWith('WFI with no interrupt enabled', main('__asm volatile("wfi");'), /firmware hung/);
 failsWith('asleep for ever', main('REG(0xe000e100) = 1; __asm volatile("wfi");'), /asleep for 2 s/, { seconds: 3 });
 const early = main('REG(0xd0000060) = 100; REG(0xd0000064) = 7; RESULT(0) = REG(0xd0000070);');

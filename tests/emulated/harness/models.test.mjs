@@ -21,7 +21,7 @@ function sensorBench(options = {}) {
   let now = 0;
   const report = new Report();
   const stimulus = options.stimulus ?? at(101325);
-  const sensor = new Ms5840({ index: 0, prng: QUIET, now_ns: () => now, report, stimulus, faults: options.faults });
+  const sensor = new Ms5840({ index: 0, prng: options.prng ?? QUIET, now_ns: () => now, report, stimulus, faults: options.faults });
   const bus = new I2cBus({ now_ns: () => now, rise_ns: 0, report });
   bus.targets = [sensor];
   const write = (address, ...bytes) => {
@@ -153,15 +153,12 @@ test('sensor: conversion time stays below the maximum, differs between parts, sa
 
 test('sensor: noise has the rms of its oversampling and repeats with its seed', () => {
   const sample = (seed, faults) => {
-    let now = 0;
-    const s = new Ms5840({ index: 0, prng: new Prng(seed), now_ns: () => now, report: new Report(), stimulus: at(1e5), faults });
-    s.wasReset = true;
-    const d2 = codesFor(s.prom, 1e5, 25).d2;
+    const b = sensorBench({ prng: new Prng(seed), stimulus: at(1e5), faults });
+    const { prom } = b.sensor;
+    b.command(0x1e, 3);
     return Array.from({ length: 2000 }, () => {
-      s.receive(0x44);
-      now += 3e6;
-      s.receive(0x00);
-      return compensate(s.prom, (s.output[0] << 16) | (s.output[1] << 8) | s.output[2], d2).pressure_Pa;
+      b.command(0x44, 3);
+      return compensate(prom, b.adc(), codesFor(prom, 1e5, 25).d2).pressure_Pa;
     });
   };
   const values = sample(5);

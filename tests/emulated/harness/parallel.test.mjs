@@ -95,11 +95,13 @@ class Controller extends ChipBench {
     return acknowledged;
   }
 
-  read16(command) {
+  /** addressed: called before the answer. */
+  read16(command, addressed = () => {}) {
     this.start();
     let acknowledged = this.byte(0xec) & this.byte(command);
     this.start();
     acknowledged &= this.byte(0xed);
+    addressed();
     const [high, low] = [this.receive(false), this.receive(true)];
     this.stop();
     return { acknowledged, words: high.map((h, k) => (h << 8) | low[k]) };
@@ -118,7 +120,13 @@ function ready(options) {
   return c;
 }
 
-const proms = (c, i = 1) => c.board.sensors.map((s) => s.prom[i]);
+const proms = (c) => c.board.sensors.map((s) => s.prom[1]);
+
+/** Every sensor answers, and nothing was warned of. */
+function areWell(c) {
+  assert.deepEqual(c.read16(0xa2), { acknowledged: ALL, words: proms(c) });
+  assert.deepEqual(c.warnings, []);
+}
 
 test('every sensor hears the same command and answers on its own line, without a warning', () => {
   const c = ready();
@@ -184,10 +192,7 @@ test('faults of single lines cost those sensors only', () => {
   c.stop();
   c.command(0x1e);
   c.wait_ns(3e6);
-  const after = c.read16(0xa2);
-  assert.equal(after.acknowledged, ALL);
-  assert.deepEqual(after.words, expected);
-  assert.deepEqual(c.warnings, []);
+  areWell(c);
 });
 
 /** The times of the controller are judged on line k again. */
@@ -239,8 +244,7 @@ test('a sensor that comes back has no PROM before its reset', () => {
   assert.deepEqual(c.read16(0xa2).words, but4);
   c.command(0x1e);
   c.wait_ns(3e6);
-  assert.deepEqual(c.read16(0xa2).words, proms(c));
-  assert.deepEqual(c.warnings, []);
+  areWell(c);
 });
 
 test('sensors that convert before their first reset are warned of', () => {
@@ -258,8 +262,7 @@ test('SCL stuck: nothing moves, and the sensors are well when it is free again',
     c.wait_ns(1e5);
     for (let i = 0; i < 9; i++) c.bit(0);
     c.stop();
-    assert.deepEqual(c.read16(0xa2).words, proms(c));
-    assert.deepEqual(c.warnings, []);
+    areWell(c);
   }
 });
 
@@ -276,26 +279,18 @@ test('a sensor that holds SDA lets go after nine clocks', () => {
   assert.equal(~c.levels & ALL, 0);
   c.stop();
   c.fault('sda_stuck_low', 6, false);
-  assert.deepEqual(c.read16(0xa2).words, proms(c));
-  assert.deepEqual(c.warnings, []);
+  areWell(c);
 });
 
 test('a clock too many puts one sensor a bit ahead, for this transfer only', () => {
   const c = ready();
-  c.start();
-  assert.equal(c.byte(0xec) & c.byte(0xa2), ALL);
-  c.start();
-  c.byte(0xed);
-  c.fault('clock_glitch', 8);
-  const [high, low] = [c.receive(false), c.receive(true)];
-  c.stop();
-  const words = high.map((h, k) => (h << 8) | low[k]);
+  const { acknowledged, words } = c.read16(0xa2, () => c.fault('clock_glitch', 8));
+  assert.equal(acknowledged, ALL);
   const wrong = words.flatMap((word, k) => (word === proms(c)[k] ? [] : [k]));
   assert.deepEqual(wrong, [8]);
   for (let i = 0; i < 9; i++) c.bit(0);
   c.stop();
-  assert.deepEqual(c.read16(0xa2).words, proms(c));
-  assert.deepEqual(c.warnings, []);
+  areWell(c);
 });
 
 test('a controller that keeps no time is told what is too short', () => {

@@ -335,13 +335,10 @@ class Line(SimulationsCase):
                 came += line.read1()
 
     def test_it_ends_with_the_simulation(self):
-        with self.served():
+        with self.served(), contextlib.ExitStack() as lines:
             with self.run_tool("simulate"):
-                connection = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE_s)
-                connection.request("GET", f"/simulated/line?serial={LEFT}&client={ONE}&token={self.token}")
-                answer = connection.getresponse()
-            answer.read()  # to its end
-            connection.close()
+                line = lines.enter_context(self.line())
+            line.read()  # to its end
             self.assertEqual(self.answered("/simulated"), (200, "[]"))
 
 

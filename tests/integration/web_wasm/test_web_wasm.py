@@ -158,8 +158,7 @@ class Simulated(WebWasm):
         self.assertEqual(len(self.seen["left"]), 1)
         self.assertIn("loader", self.seen["left"][0])
         self.assertIn("connect again", self.seen["left"][0])
-        again = self.folder / "again.ftr"
-        again.write_bytes((self.folder / "scene.ftr.again").read_bytes())
+        again = (self.folder / "scene.ftr.again").rename(self.folder / "again.ftr")
         self.fingertip("convert", again, self.folder / "again.csv")
         rows, head = self.recording(self.folder / "again.csv")
         self.assertTrue(int(head["stored"]) & STORED_PAD)
