@@ -1,6 +1,7 @@
 #!/usr/bin/env node
 /** Command line of the emulator: see USAGE. */
 import { createInterface } from 'node:readline';
+import { setImmediate as breathe, setTimeout as sleep } from 'node:timers/promises';
 import { BOARDS, findBoard } from './board/boards.mjs';
 import { findSensor } from './board/ms5840.mjs';
 import { strobe } from './board/sync_pin.mjs';
@@ -78,20 +79,22 @@ const USBREDIR_SLICE_NS = 200e3;
 const SLICE_BATCH_NS = 50e6;
 const STROBE_HIGH_NS = 1e6;
 
+const isTime = (v) => Number.isFinite(v) && v >= 0;
+const NUMBERS = {
+  seed: [isWhole(0, 2 ** 32 - 1), 'a whole number from 0 to 4294967295'],
+  'clock-ppm': [(v) => Math.abs(v) <= 1000, 'a number from -1000 to 1000'],
+  seconds: [isPositive, 'a positive number of seconds'],
+  'vcd-from': [isTime, 'a time in seconds, 0 or later'],
+  'vcd-to': [isTime, 'a time in seconds, 0 or later'],
+  'count-from': [isPositive, 'a positive number of seconds'],
+  'sync-strobe': [(v) => v >= 2 && v <= 60000, 'a period from 2 to 60000 ms'],
+  'rise-ns': [(v) => v >= 0 && v <= 1000, 'a rise time from 0 to 1000 ns'],
+};
+
 function judgeOptions(values) {
-  const number = (name, check, what) => numberOf(name, values[name], check, what);
-  values.seed = number('seed', isWhole(0, 2 ** 32 - 1), 'a whole number from 0 to 4294967295');
-  values['clock-ppm'] = number('clock-ppm', (v) => Math.abs(v) <= 1000, 'a number from -1000 to 1000');
-  if (values.seconds !== undefined) values.seconds = number('seconds', isPositive, 'a positive number of seconds');
-  for (const name of ['vcd-from', 'vcd-to']) {
-    values[name] =
-      values[name] === undefined ? Infinity : number(name, (v) => Number.isFinite(v) && v >= 0, 'a time in seconds, 0 or later');
-  }
+  for (const [name, [check, what]] of Object.entries(NUMBERS))
+    if (values[name] !== undefined) values[name] = numberOf(name, values[name], check, what);
   if (values['vcd-to'] < values['vcd-from']) throw new InputError('--vcd-to is before --vcd-from');
-  if (values['count-from'] !== undefined) values['count-from'] = number('count-from', isPositive, 'a positive number of seconds');
-  if (values['sync-strobe'] !== undefined)
-    values['sync-strobe'] = number('sync-strobe', (v) => v >= 2 && v <= 60000, 'a period from 2 to 60000 ms');
-  if (values['rise-ns'] !== undefined) values['rise-ns'] = number('rise-ns', (v) => v >= 0 && v <= 1000, 'a rise time from 0 to 1000 ns');
   if (!/^[0-9a-fA-F]{16}$/.test(values.serial)) throw new InputError(`--serial "${values.serial}" is not 16 hexadecimal digits`);
   values.pace ??= values.pty || values.usbredir ? 'real' : 'fast';
   if (!['real', 'fast'].includes(values.pace)) throw new InputError(`--pace "${values.pace}" is neither real nor fast`);
@@ -108,9 +111,6 @@ function readFlash(path) {
     throw new InputError(`${path}: ${flash.length} bytes; the flash has ${FLASH_BYTES}; give the file of an earlier run, or a new name`);
   return flash;
 }
-
-const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
-const breathe = () => new Promise((resolve) => setImmediate(resolve));
 
 /** Runs as far as the program on stdin asks, until the run or that program ends. */
 function runStepped(machine, port, end_ns) {
@@ -176,7 +176,7 @@ async function run(options) {
         probes: Board.probes,
         comment: `board ${options.board}; a level is high from 0.7 VDD on`,
         from_ns: options['vcd-from'] * 1e9,
-        to_ns: options['vcd-to'] * 1e9,
+        to_ns: (options['vcd-to'] ?? Infinity) * 1e9,
       });
     const usbLog = output(options['usb-log'], 't_ns,endpoint,dir,length,bytes,offered_ns');
 

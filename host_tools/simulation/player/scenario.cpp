@@ -1,17 +1,16 @@
 #include "simulation/player/scenario.hpp"
 
 #include "libfingertip/error.hpp"
+#include "libfingertip/text.hpp"
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <optional>
-#include <sstream>
 
 namespace fingertip {
 
@@ -21,20 +20,6 @@ constexpr const char *TRUTH[] = {"contact", "x_mm", "y_mm", "force_N", "p0_Pa", 
 constexpr std::size_t TRUTHS = std::size(TRUTH);
 /* After the sensors, in any order. */
 constexpr const char *OPTIONAL[] = {"Qx_N", "Qy_N", "temperature_degC"};
-
-static std::string trimmed(const std::string &text) {
-  const std::size_t first = text.find_first_not_of(" \t\r");
-  return first == std::string::npos ? std::string() : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
-/* Not finite where it is no number. */
-static double number(const char *begin, const char *end) {
-  double value = std::nan("");
-  const auto [stop, error] = std::from_chars(begin, end, value);
-  return error == std::errc() && stop == end ? value : std::nan("");
-}
-
-static double number(const std::string &text) { return number(text.data(), text.data() + text.size()); }
 
 Scenario::Scenario(const std::string &path) {
   std::ifstream file(path);
@@ -53,7 +38,7 @@ Scenario::Scenario(const std::string &path) {
     if (file.eof()) {
       fail("the file ends within a line, so its end is missing; write it again");
     }
-    line = trimmed(line);
+    line = std::string(trim(line));
     if (line_number == 1) {
       if (line != "# fingertip-scenario 1") {
         fail("not a scenario; the first line must be \"# fingertip-scenario 1\"");
@@ -66,18 +51,15 @@ Scenario::Scenario(const std::string &path) {
     if (line[0] == '#') {
       const std::size_t colon = line.find(':');
       if (colon != std::string::npos && header.empty()) {
-        metadata[trimmed(line.substr(1, colon - 1))] = trimmed(line.substr(colon + 1));
+        metadata[std::string(trim(std::string_view(line).substr(1, colon - 1)))] = trim(std::string_view(line).substr(colon + 1));
       }
       continue;
     }
     if (header.empty()) {
-      std::stringstream cells(line);
-      for (std::string cell; std::getline(cells, cell, ',');) {
-        header.push_back(trimmed(cell));
-      }
+      header = texts_of(split(line, ','), [](std::string_view cell) { return std::string(trim(cell)); });
       const auto given = [&](const char *key, double usual, double limit, const char *most) {
         const auto found = metadata.find(key);
-        const double value = found == metadata.end() ? usual : number(found->second);
+        const double value = found == metadata.end() ? usual : to_double(found->second).value_or(std::nan(""));
         if (!(std::abs(value) <= limit)) {
           fail(std::string("metadata \"") + key + "\" is \"" + found->second + "\"; give " + most);
         }
@@ -115,17 +97,13 @@ Scenario::Scenario(const std::string &path) {
       continue;
     }
     values.clear();
-    const char *at = line.data(), *end = at + line.size();
-    while (at <= end) {
-      const char *comma = std::find(at, end, ',');
-      const double value = number(at, comma);
-      if (!std::isfinite(value)) {
-        const std::size_t column = values.size();
-        fail("column \"" + (column < header.size() ? header[column] : "") + "\" is \"" + std::string(at, comma) +
-             "\"; give a finite number");
+    for (const std::string_view cell : split(line, ',')) {
+      const std::size_t column = values.size();
+      const auto value = to_double(cell);
+      if (!value) {
+        fail("column \"" + (column < header.size() ? header[column] : "") + "\" is \"" + std::string(cell) + "\"; give a finite number");
       }
-      values.push_back(value);
-      at = comma + 1;
+      values.push_back(*value);
     }
     if (values.size() != header.size()) {
       fail(std::to_string(values.size()) + " columns; the header has " + std::to_string(header.size()));

@@ -9,6 +9,7 @@
  * At most WINDOW bytes wait for the client; beyond that the emulated host stops reading the device.
  */
 import { spawn } from 'node:child_process';
+import { setTimeout as sleep } from 'node:timers/promises';
 import { fileURLToPath } from 'node:url';
 import { InputError, inWords } from '../errors.mjs';
 
@@ -126,9 +127,7 @@ export class PtyPort {
 
   /** Give the client up to a second to take what was sent. */
   async drain() {
-    for (let i = 0; i < 100 && this.outstanding > 0 && this.isOpen && !this.failure; i++) {
-      await new Promise((resolve) => setTimeout(resolve, 10));
-    }
+    for (let i = 0; i < 100 && this.outstanding > 0 && this.isOpen && !this.failure; i++) await sleep(10);
   }
 
   async stop() {

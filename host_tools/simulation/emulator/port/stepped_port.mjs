@@ -15,7 +15,7 @@
  * What happens "at" a time must be requested before emulated time is there. A pipe that
  * closes without 'E' breaks the run off, as wrong usage does.
  */
-import { readSync, writeSync } from 'node:fs';
+import { readSync, writeFileSync } from 'node:fs';
 import { InputError } from '../errors.mjs';
 
 const CHUNK = 65536;
@@ -75,9 +75,7 @@ export class SteppedPort {
 
   /** Time has passed until now. */
   answer(now_ns, hasEnded) {
-    const data = Buffer.concat([...this.sent, this.#frame('T', now_ns, [hasEnded ? 1 : 0])]);
-    this.sent = [];
-    for (let at = 0; at < data.length; ) at += writeSync(1, data, at);
+    writeFileSync(1, Buffer.concat([...this.sent.splice(0), this.#frame('T', now_ns, [hasEnded ? 1 : 0])]));
   }
 
   #frame(type, at_ns, bytes) {

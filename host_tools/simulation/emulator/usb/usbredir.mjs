@@ -12,6 +12,7 @@
  *
  * Not carried by the protocol: frames, suspend and resume.
  */
+import { once } from 'node:events';
 import { lstatSync, unlinkSync } from 'node:fs';
 import { connect, createServer } from 'node:net';
 import { InputError, inWords } from '../errors.mjs';
@@ -202,23 +203,16 @@ export class UsbRedirServer {
     const status = lstatSync(this.where, { throwIfNoEntry: false });
     if (!status) return;
     if (!status.isSocket()) throw new InputError(`--usbredir ${this.where}: exists and is no socket; choose another path`);
-    const answers = await new Promise((resolve) => {
-      const probe = connect(this.where);
-      probe.once('connect', () => {
-        probe.destroy();
-        resolve(true);
-      });
-      probe.once('error', () => resolve(false));
-    });
+    const probe = connect(this.where);
+    const answers = await once(probe, 'connect').catch(() => null);
+    probe.destroy();
     if (answers) throw new InputError(`--usbredir ${this.where}: another emulator serves it; choose another path`);
     unlinkSync(this.where);
   }
 
   async stop() {
     this.socket?.destroy();
-    await new Promise((resolve) => {
-      this.server.close(resolve);
-    });
+    await once(this.server.close(), 'close');
   }
 
   /** For Machine's `makeClient`. */

@@ -123,16 +123,15 @@ export class Buckets {
       const sd = sdName !== null && flags & sdValid ? history.columns[sdName][row] : NaN;
       if (trust > track.trust[slot]) {
         track.trust[slot] = trust;
-        track.low[slot] = track.high[slot] = value;
-        track.rises[slot] = 1;
-        track.sdLow[slot] = value - sd;
-        track.sdHigh[slot] = value + sd;
-        continue;
+        track.low[slot] = Infinity;
+        track.high[slot] = -Infinity;
+        track.sdLow[slot] = track.sdHigh[slot] = NaN;
       }
       if (value < track.low[slot]) {
         track.low[slot] = value;
         track.rises[slot] = 0;
-      } else if (value > track.high[slot]) {
+      }
+      if (value > track.high[slot]) {
         track.high[slot] = value;
         track.rises[slot] = 1;
       }

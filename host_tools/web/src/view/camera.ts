@@ -38,12 +38,8 @@ export function cameraOf(look: Look, aspect: number, points: readonly Point[], p
   const [x, back_x] = between(right, high * aspect * part[0]);
   const [y, back_y] = between(up, high * part[1]);
   const z = Math.max(back_x, back_y);
-  const eye: Point = [
-    x * right[0] + y * up[0] + z * back[0],
-    x * right[1] + y * up[1] + z * back[1],
-    x * right[2] + y * up[2] + z * back[2],
-  ];
-  return { eye, right, up, back, aspect };
+  const [eye_x, eye_y, eye_z] = [0, 1, 2].map((i) => x * right[i] + y * up[i] + z * back[i]);
+  return { eye: [eye_x, eye_y, eye_z], right, up, back, aspect };
 }
 
 /** Where a point is seen: -1 to 1, to the right and up. */
@@ -57,10 +53,7 @@ export function seen({ eye, right, up, back, aspect }: Camera, point: Point): { 
  * where none is: at the horizon and above. */
 export function picked(camera: Camera, right: number, up: number, height_mm = 0): { x_mm: number; y_mm: number } | null {
   const high = Math.tan(HALF_VIEW_rad);
-  const ray = [0, 1, 2].map(
-    (i) => (camera.right[i] ?? 0) * right * high * camera.aspect + (camera.up[i] ?? 0) * up * high - (camera.back[i] ?? 0),
-  );
-  const [dx = 0, dy = 0, dz = 0] = ray;
+  const [dx, dy, dz] = [0, 1, 2].map((i) => camera.right[i] * right * high * camera.aspect + camera.up[i] * up * high - camera.back[i]);
   const along = (height_mm - camera.eye[2]) / dz;
   if (!(dz < -1e-6) || !(along > 0)) {
     return null;
