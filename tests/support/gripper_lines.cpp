@@ -2,7 +2,6 @@
 
 #include "grasp/gripper/robotiq.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <cstdio>

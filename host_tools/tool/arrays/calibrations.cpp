@@ -4,10 +4,6 @@
 #include "libfingertip/in_parallel.hpp"
 #include "tool/arrays/entry.hpp"
 
-extern "C" {
-#include "fit/fit.h"
-}
-
 #include <algorithm>
 #include <cstring>
 

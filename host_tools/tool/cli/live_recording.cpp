@@ -5,7 +5,6 @@
 #include "libfingertip/text.hpp"
 #include "tool/cli/terminal.hpp"
 
-#include <cstdlib>
 #include <ctime>
 #include <utility>
 

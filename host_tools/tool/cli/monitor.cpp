@@ -2,7 +2,6 @@
 
 #include "libfingertip/packet_fields.hpp"
 #include "tool/cli/chart.hpp"
-#include "tool/cli/names_of_values.hpp"
 #include "tool/cli/pad_picture.hpp"
 #include "tool/cli/panel.hpp"
 

@@ -1,6 +1,5 @@
 #include "tool/cli/panel.hpp"
 
-#include "libfingertip/packet_fields.hpp"
 #include "tool/advice.hpp"
 
 #include <algorithm>

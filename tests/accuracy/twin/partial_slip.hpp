@@ -11,7 +11,6 @@
 #include "simulation/twin/contact.hpp"
 #include "simulation/twin/transform.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <vector>

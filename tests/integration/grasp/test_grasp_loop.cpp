@@ -1,6 +1,5 @@
 #include "grasp/grasp_loop.hpp"
 #include "grasp/settings.hpp"
-#include "libfingertip/names.hpp"
 #include "support/fake_gripper.hpp"
 #include "support/soft_fingertip.hpp"
 

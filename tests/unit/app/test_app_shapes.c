@@ -2,7 +2,6 @@
  * none of these, on the pad that the profile describes. */
 #include "app_rig.h"
 #include "common/contact_flags.h"
-#include "config/defaults.h"
 #include "support/pad.h"
 
 #define PRESS_us 1500000u

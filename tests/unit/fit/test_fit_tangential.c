@@ -1,6 +1,5 @@
 /* The tangential estimate against readings that its own model makes, and at the edges of what it takes.
  * tests/accuracy holds it to an estimator of its own in double precision. */
-#include "common/contact_flags.h"
 #include "fit/fit_tangential.h"
 #include "pad_press.h"
 

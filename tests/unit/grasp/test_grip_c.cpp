@@ -11,7 +11,6 @@
 #include <cstring>
 #include <gtest/gtest.h>
 #include <memory>
-#include <string>
 
 using namespace fingertip;
 

@@ -7,7 +7,6 @@
 #include "grasp/words.hpp"
 #include "libfingertip/clock.hpp"
 #include "libfingertip/connection.hpp"
-#include "libfingertip/names.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/packet_fields.hpp"
 #include "libfingertip/packet_file.hpp"
