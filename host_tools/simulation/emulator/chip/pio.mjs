@@ -14,7 +14,7 @@
  * receive FIFO. Everything else fails the run.
  * Warns: a transmit FIFO written while full, a receive FIFO read while empty.
  */
-import { field, RegisterBlock } from './registers.mjs';
+import { arrayAt, field, RegisterBlock } from './registers.mjs';
 
 const FIFO_DEPTH = 4;
 const WORD_BITS = 32;
@@ -401,16 +401,7 @@ export class Pio extends RegisterBlock {
     0x00: { read: (b) => (b.enabled ? CTRL_ENABLE : 0), write: (b, value) => b.#writeCtrl(value) },
     0x10: { write: (b, value) => b.#put(value | 0) },
     0x20: { read: (b) => b.#get() },
-    ...Object.fromEntries(
-      Array.from({ length: 32 }, (_, i) => [
-        0x48 + 4 * i,
-        {
-          write: (b, value) => {
-            b.memory[i] = value;
-          },
-        },
-      ]),
-    ),
+    ...arrayAt(0x48, 32, (i) => ({ write: (b, value) => b.memory.fill(value, i, i + 1) })), // not to be read
     0xc8: { write: (b, value) => b.#writeClkdiv(value) },
     0xcc: { ...field('execctrl'), write: (b, value) => b.#configure('execctrl', value, EXECCTRL_MODELLED) },
     0xd0: { ...field('shiftctrl'), write: (b, value) => b.#writeShiftctrl(value) },

@@ -9,7 +9,11 @@ export const field = (key, mask = 0xffffffff) => ({
   },
 });
 
-/** The same, of a block that checks first whether it may be written now. */
+/** An array of registers from this offset on, each of its index. */
+export const arrayAt = (offset, length, registerOf) =>
+  Object.fromEntries(Array.from({ length }, (_, i) => [offset + 4 * i, registerOf(i)]));
+
+/** A field of a block that checks first whether it may be written now. */
 export const checkedField = (check, key, mask) => ({
   ...field(key, mask),
   write(block, value) {

@@ -5,7 +5,7 @@
  * counter reaches a value exactly when the tick does, and an alarm fires at that tick, never earlier. The
  * watchdog counts down twice per tick (erratum RP2040-E1) and reboots what PSM_WDSEL selects.
  */
-import { clearedByOnes, constant, field, RegisterBlock } from './registers.mjs';
+import { arrayAt, clearedByOnes, constant, field, RegisterBlock } from './registers.mjs';
 
 const WATCHDOG_MAX = 0xffffff;
 const TIMER_RESET = 21;
@@ -87,10 +87,7 @@ export class Timer extends RegisterBlock {
   static #alarm = (i) => ({ read: (b) => b.alarms[i].target, write: (b, value) => b.#arm(b.alarms[i], value) });
 
   static registers = {
-    0x10: Timer.#alarm(0),
-    0x14: Timer.#alarm(1),
-    0x18: Timer.#alarm(2),
-    0x1c: Timer.#alarm(3),
+    ...arrayAt(0x10, 4, Timer.#alarm),
     0x20: {
       read: (b) => b.alarms.reduce((bits, a, i) => bits | (a.armed ? 1 << i : 0), 0),
       write: (b) => b.#disarm(b.rawWriteValue),
@@ -196,21 +193,11 @@ export class Watchdog extends RegisterBlock {
     this.tickChanged();
   }
 
-  static #scratch = (i) => [
-    0x0c + 4 * i,
-    {
-      read: (b) => b.scratch[i],
-      write: (b, value) => {
-        b.scratch[i] = value;
-      },
-    },
-  ];
-
   static registers = {
     0x00: { read: (b) => (b.ctrl & 0x47000000) | b.#left(), write: (b, value) => b.#writeCtrl(value) },
     0x04: { write: (b, value) => b.#feed(value) },
     0x08: { read: (b) => b.reason },
-    ...Object.fromEntries([0, 1, 2, 3, 4, 5, 6, 7].map(Watchdog.#scratch)),
+    ...arrayAt(0x0c, 8, (i) => ({ read: (b) => b.scratch[i], write: (b, value) => b.scratch.fill(value, i, i + 1) })),
     0x2c: { read: (b) => b.tick | (b.ticking ? 0x400 : 0), write: (b, value) => b.#writeTick(value) },
   };
 
