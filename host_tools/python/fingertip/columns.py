@@ -38,7 +38,7 @@ class Columns(Mapping[str, Array]):
         self._codes = {"time_us": "d", "line": "Q", **codes}
         self._shown, self._absent = shown, absent
         self._floats = [at for at, code in enumerate(self._codes.values()) if code == "f"]
-        self._scales = np.array([[_SENT[code][0]] for code in self._codes.values() if code in _SENT])
+        self._scales = np.array([_SENT[code][0] for code in self._codes.values() if code in _SENT])[:, None]
         self._sent = len(self._codes) - len(self._scales)  # from here on
         self._waiting: list[Array] = []
         self._blocks: list[tuple[int, list[Any]]] = []  # rows, and of each column the least number and the distances, or doubles
