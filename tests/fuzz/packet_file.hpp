@@ -9,7 +9,6 @@
 #include "line.hpp"
 #include "memory_file.hpp"
 
-#include <filesystem>
 #include <vector>
 
 namespace fuzz {

@@ -8,7 +8,6 @@
 #include <sstream>
 #include <string>
 #include <unistd.h>
-#include <vector>
 
 namespace test {
 

@@ -5,7 +5,6 @@
    Says "matched TOPIC" once a writer of that topic and type was found, and "gone TOPIC". Ends with
    its standard input. Then, for topic k from 0, FOLDER/k.bin holds each message as it came: its
    length in four bytes, little endian, and its CDR bytes. */
-#include <cstdio>
 #include <cstdlib>
 #include <deque>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
