@@ -45,14 +45,11 @@ class Grasp(unittest.TestCase):
 
     def test_one_thing_comes_after_the_other(self):
         slip = self.slip
-        self.assertEqual(slip["reported_by"], "SLIDING")
         course = [0.0, *(slip[name] for name in emulated_grasp.COURSE)]
         self.assertEqual(course, sorted(course))
         self.assertLess(slip["sent_ms"], TOLD_ms)
         # Half a conversion, the bus, the fit, the line.
         self.assertTrue(1.5 < slip["sent_ms"] - slip["measured_ms"] < 5.0, course)
-        # The gripper's own latency.
-        self.assertTrue(24.9 < slip["moved_ms"] - slip["asked_ms"] < 26.0, course)
 
     def test_every_frame_came(self):
         asked_s, end_s = self.found["asked_s"], self.found["end_s"]

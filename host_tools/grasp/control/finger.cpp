@@ -20,7 +20,7 @@ constexpr double DELAY_SHARE = 0.05; // weight of a frame in the moving average 
 constexpr int ZERO_FRAMES = 3;
 constexpr double LOAD_SD_LEAST_N = 0.06;
 constexpr double SHARED_N = 0.3; // a load whose share of both has a meaning
-constexpr double SURE_SDS = 2.0;
+constexpr double SURE_SDS = 0.8; // of a load that may be none: what was estimated at two is reported so (contact/tangential.h)
 // A force whose standard deviation is a larger share of it is no measurement. That of a long or wide contact is measured: only how far it
 // reaches beyond the pad is not.
 constexpr double FORCE_SD_MOST = 1.0, WIDE_mm = 15.0;
@@ -170,8 +170,8 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
   const bool has_place = touch_.t_s < place_t_s_ + settings.stale_s && (place_zero_.is_known || !is_zeroed_);
   reading.by_place = reading.contact && !reading.has_load && has_place;
   if (reading.has_load) {
-    reading.load_x_N = touch_.qx_N - load_zero_.x;
-    reading.load_y_N = touch_.qy_N - load_zero_.y;
+    reading.moved_x_N = reading.load_x_N = touch_.qx_N - load_zero_.x;
+    reading.moved_y_N = reading.load_y_N = touch_.qy_N - load_zero_.y;
     reading.load_sd_N = std::max(touch_.q_sd_N, LOAD_SD_LEAST_N);
     reading.speed_mm_s = std::hypot(touch_.speed_x_mm_s, touch_.speed_y_mm_s);
   } else if (reading.by_place) {
@@ -217,6 +217,8 @@ static void load_by_place(Readings &readings, const GripSettings &settings, Grip
       reading.has_load = true;
       reading.load_x_N = place.x * reading.force_N;
       reading.load_y_N = place.y * reading.force_N;
+      reading.moved_x_N = reading.load_x_N + place.slid_x * reading.force_N;
+      reading.moved_y_N = reading.load_y_N + place.slid_y * reading.force_N;
       reading.load_N = pulled * reading.force_N;
       reading.load_sd_N = std::max(PLACE_SD * reading.load_N, LOAD_SD_LEAST_N);
       reading.speed_mm_s = place.speed_mm_s;

@@ -39,6 +39,7 @@ struct GripReading {
   bool is_left_out = false; // contradicts the other fingertip
   double t_s = 0.0;         // time of the measured force
   double load_x_N = 0.0, load_y_N = 0.0;
+  double moved_x_N = 0.0, moved_y_N = 0.0; // the same, with what has slid where it is by_place
   double force_N = 0.0, sd_N = 0.0, load_N = 0.0, load_sd_N = 0.0, speed_mm_s = 0.0;
   bool by_place = false; // has_load is by how far the contact has moved since end_zero; pulled: tangential over normal force, of it alone
   double pulled_x = 0.0, pulled_y = 0.0;
@@ -70,18 +71,18 @@ public:
 
   // keeps and pull_N are of the present load from now on. False: it is smaller than this. is_marked: it was not, and frames come.
   bool mark(double least_N) {
-    mark_x_N_ = believed_.load_x_N, mark_y_N_ = believed_.load_y_N;
-    return is_marked_ = believed_.has_load && believed_.load_N >= least_N;
+    mark_x_N_ = believed_.moved_x_N, mark_y_N_ = believed_.moved_y_N, mark_N_ = believed_.load_N;
+    return is_marked_ = believed_.has_load && mark_N_ >= least_N;
   }
   bool is_marked(const GripReading &reading) const { return is_marked_ && reading.counts; }
   // Share of the marked load that this one has, along it, and how far it is from it. Without a load now: all, and 0.
   double keeps(const GripReading &reading) const {
-    const double square = mark_x_N_ * mark_x_N_ + mark_y_N_ * mark_y_N_;
-    const double along = mark_x_N_ * reading.load_x_N + mark_y_N_ * reading.load_y_N;
-    return reading.has_load && square > 0.0 ? along / square : 1.0;
+    const double mark_N = std::hypot(mark_x_N_, mark_y_N_);
+    const double less = mark_x_N_ * (mark_x_N_ - reading.moved_x_N) + mark_y_N_ * (mark_y_N_ - reading.moved_y_N);
+    return reading.has_load && mark_N > 0.0 ? 1.0 - less / (mark_N * mark_N_) : 1.0;
   }
   double pull_N(const GripReading &reading) const {
-    return reading.has_load ? std::hypot(reading.load_x_N - mark_x_N_, reading.load_y_N - mark_y_N_) : 0.0;
+    return reading.has_load ? std::hypot(reading.moved_x_N - mark_x_N_, reading.moved_y_N - mark_y_N_) : 0.0;
   }
 
   // Sets the zeros of tangential force and place to their means between begin and end.
@@ -107,7 +108,7 @@ private:
   double delay_s_ = 0.0;
   double force_t_s_ = 0.0, force_N_ = 0.0, sd_N_ = 0.0;
   GripReading believed_;
-  double doubted_s_ = 0.0, of_both_ = 1.0, mark_x_N_ = 0.0, mark_y_N_ = 0.0;
+  double doubted_s_ = 0.0, of_both_ = 1.0, mark_x_N_ = 0.0, mark_y_N_ = 0.0, mark_N_ = 0.0;
   bool is_doubted_ = false, is_marked_ = false;
   int unchanged_ = 0; // frames whose values are those of the one before
   struct Zero {       // the mean, once it has ended

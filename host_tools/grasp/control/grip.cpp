@@ -232,8 +232,11 @@ std::uint32_t Grip::hold() {
       return 0;
     }
     const bool places = holds_ == GRIP_PLACING;
+    if (places && hold_.is_by_place() && readings_.high_N <= settings_.cap_N) {
+      return 0; // a table that presses on a line or an area changes its force and place either way: the width stays
+    }
+    readings_.slides = readings_.slides && (places ? readings_.keeps > TAKEN : !is_pulled());
     readings_.load_N = std::min(readings_.load_N, places ? readings_.keeps * marked_N_ : marked_N_);
-    readings_.slides = readings_.slides && (!places || readings_.keeps > TAKEN);
   }
   const double wanted_N = hold_.wants(readings_, reach_.coming_N(readings_, now_s_), settings_, now_s_, dead_s());
   const bool slides = hold_.is_sliding();
@@ -249,7 +252,7 @@ std::uint32_t Grip::hold() {
 // The table has the load, or someone pulls: for as long as a silence may last, and as every fingertip that had a load
 // reports. One that reports none any more is no evidence.
 bool Grip::is_taken() {
-  const bool slides = readings_.slides && readings_.load_N > marked_N_ && readings_.pull_N > 0.5 * settings_.pull_N;
+  const bool slides = readings_.slides && is_pulled();
   const bool kept = holds_ == GRIP_PLACING ? readings_.keeps > TAKEN : readings_.pull_N < settings_.pull_N && !slides;
   kept_s_ = kept ? now_s_ : kept_s_;
   return now_s_ - kept_s_ >= settings_.stale_s;

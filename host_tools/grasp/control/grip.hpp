@@ -70,6 +70,8 @@ private:
     return left || right;
   }
   bool is_taken();
+  // A slide in HANDING that goes with a pull.
+  bool is_pulled() const { return readings_.pull_N > 0.5 * settings_.pull_N && (readings_.by_place || readings_.load_N > marked_N_); }
   std::uint32_t aim(const GripAim &aim);
   void ramp(double to_mm, double speed_mm_s);
   double dead_s() const { return readings_.delay_s + traits_.latency_s + reach_.poll_s(); }

@@ -30,8 +30,6 @@ constexpr double FALLS_s = 0.06;
 // The load of an object that slides and does not slow down is its friction plus the force that stops
 // it within STOPS_s. The estimate follows with the time constant FOLLOWS_s.
 constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
-// A load by the place changes a little with the grip: the grip loosens to this share of what is needed.
-constexpr double PLACE_LOOSENS = 1.25;
 // Friction falls by less than this factor as a slide begins.
 constexpr double GROWN = 1.4;
 
@@ -156,7 +154,7 @@ double GripHold::wants(const GripReadings &readings, double coming_N, const Grip
     // The present grip decays slowly.
     const bool rests = !readings.slides && (slides_ == 0 || now_s - slid_s_ > settings.rest_s);
     const double share = rests ? 1.0 - std::exp(-settings.decay_1_s * passed_s) : 0.0;
-    wanted_N_ -= share * std::max(wanted_N_ - (by_place_ ? PLACE_LOOSENS : 1.0) * need, 0.0);
+    wanted_N_ -= share * std::max(wanted_N_ - need, 0.0);
   }
   return wanted_N_ = std::max(wanted_N_, need);
 }

@@ -12,7 +12,7 @@ from reporting import built, run  # noqa: E402
 CLOCKS_ppm = "25,-25"
 # Of the slip: what is called how.
 COURSE = {
-    "measured_ms": "the first frame that reported it was measured",
+    "measured_ms": "the first frame that reported SLIDING was measured",
     "sent_ms": "its packet had left the chip",
     "answered_ms": "the controller's command changed",
     "asked_ms": "it went out on the gripper's line",

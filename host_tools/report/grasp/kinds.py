@@ -40,6 +40,7 @@ SETS = {"12 s": ((*STILL, "12"), "ours"), "60 s": ((*STILL, "60"), "ours"), "12 
 # What one fingertip reports wrongly in a steady hold: for one frame, for ten; the others for good.
 WRONG_SHORT, WRONG = ("frame", "frames", "spike"), ("nothing", "tared", "reboot", "moved_zero", "weak")
 SQUEEZED, SQUEEZED_N = 1.3, 1.0  # the grip rises by both
+REQUESTS, AGAINST = ("place", "hand_over"), 1.5  # the grip rises by so much against a pull
 CYCLES = 4  # turns of the commanded width in the last half of a hold
 GRASPS, GRASPS_MORE = 1000, 200
 USUAL, USUAL_MORE = 100, 30
@@ -119,13 +120,18 @@ def summary_of_sets(each):
     }
 
 
-def summary_of_wrong(each):
+def summary_of_held(each):
+    """Of steady holds in which something happens: wrong readings, or a request."""
     held = [one for one in each if one["before_N"] > 0]
     squeezed = [one for one in held if one["after_N"] > max(SQUEEZED * one["before_N"], one["before_N"] + SQUEEZED_N)]
+    released = [one for one in held if one["released"]]  # by a request only
     return {
         "grasps": len(held),
         "squeezed": len(squeezed),
         "squeezed_percent": percent(len(squeezed), len(held)),
+        "against": sum(one["after_N"] > AGAINST * one["before_N"] for one in held),
+        "opened_percent": percent(sum(not one["early"] for one in released), len(held)),
+        "opened_early": sum(one["early"] for one in released),
         "dropped": sum(one["dropped"] for one in held),
         "reported": sorted({word for one in held for word in one["reported"].split()}),
     }
@@ -163,15 +169,20 @@ JUDGED = {
     "turned_unreported_percent": (None, worst("turned_unreported_percent", "usual and rough")),
     "friction_below_0.6_of_true_percent": (5, worst("friction_below_0.6_of_true_percent", "usual and rough")),
     "limit_cycles": (0, lambda ours, sets, wrong: sum(row["limit_cycles"] for row in sets if row["row"] != "12 s")),
-    "one_bad_frame_squeezed": (0, lambda ours, sets, wrong: sum(row["squeezed"] for row in wrong if row["wrong"] in WRONG_SHORT)),
+    "one_bad_frame_squeezed": (0, lambda ours, sets, wrong: sum(row["squeezed"] for row in wrong if row["then"] in WRONG_SHORT)),
     "lasting_bad_squeezed_percent": (
         2,
-        lambda ours, sets, wrong: max((row["squeezed_percent"] or 0 for row in wrong if row["wrong"] in WRONG), default=None),
+        lambda ours, sets, wrong: max((row["squeezed_percent"] or 0 for row in wrong if row["then"] in WRONG), default=None),
     ),
 }
 LIMITS = {f"{name}_{called}": limit for name, (limits, _) in BY_GRIPPER.items() for called, limit in zip(CALLED.values(), limits)}
 LIMITS |= {f"margin_median_{shape}": limit for shape, (_, limit) in BY_SHAPE.items()} | {name: limit for name, (limit, _) in JUDGED.items()}
-GOALS = tuple((name, "<=", limit) for name, limit in LIMITS.items() if limit is not None)
+GOALS = tuple((name, "<=", limit) for name, limit in LIMITS.items() if limit is not None) + (
+    ("place_rises", "<=", 0),
+    ("placed_opened_percent", ">=", 98),
+    ("handed_over_percent", ">=", 98),
+    ("pulled_against_over_1.5x", "<=", 0),
+)
 
 
 def figures(rows, sets, shapes, wrong):
@@ -232,12 +243,20 @@ def measure(options, steps):
             call = (*arguments, "--gripper", gripper, "--controller", controller, "--seed", options.seed, "--count", count)
             found["sets"].append({"row": name, "gripper": gripper, **summary_of_sets(found_by(options.build, *call)["each"])})
             steps.report(f"{gripper}, a set force for {name}: {count} grasps")
-    found["wrong"] = []
-    for name in WRONG_SHORT + WRONG:
-        for gripper in GRIPPERS:
-            call = (*MIXED, "--wrong", name, "--gripper", gripper, "--seed", options.seed, "--count", max(1, more // 3))
-            found["wrong"].append({"wrong": name, "gripper": gripper, **summary_of_wrong(found_by(options.build, *call)["each"])})
-    steps.report(f"wrong readings of a fingertip: {sum(row['grasps'] for row in found['wrong'])} grasps")
+    for key, names, count in (("wrong", WRONG_SHORT + WRONG, max(1, more // 3)), ("requests", REQUESTS, more)):
+        found[key] = []
+        for name in names:
+            for gripper in GRIPPERS:
+                call = (*MIXED, "--then", name, "--gripper", gripper, "--seed", options.seed, "--count", count)
+                found[key].append({"then": name, "gripper": gripper, **summary_of_held(found_by(options.build, *call)["each"])})
+        steps.report(f"{key} in a steady hold: {sum(row['grasps'] for row in found[key])} grasps")
+    place, hand = ([row for row in found["requests"] if row["then"] == name] for name in REQUESTS)
+    found |= {
+        "place_rises": sum(row["squeezed"] for row in place),
+        "placed_opened_percent": min(row["opened_percent"] for row in place),
+        "handed_over_percent": min(row["opened_percent"] for row in hand),
+        "pulled_against_over_1.5x": sum(row["against"] for row in hand),
+    }
     return found | figures(found["kinds"], found["sets"], found["shapes"], found["wrong"])
 
 

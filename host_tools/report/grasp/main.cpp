@@ -18,11 +18,15 @@ namespace {
 using namespace cell;
 using nlohmann::ordered_json;
 
-enum Stream : std::uint64_t { NOISE = 881, SET };
+enum Stream : std::uint64_t { NOISE = 881, SET, ASKED };
 
 constexpr double FIXED_N = 15.0, PAPER_N = 6.0;
 constexpr double SET_LEAST_N = 2.0, SET_MOST_N = 15.0; // of a still grasp
-constexpr double STEADY_s = 1.5, WATCHED_s = 3.5;      // before and after wrong readings
+constexpr double STEADY_s = 1.5, WATCHED_s = 3.5;      // before and after what happens in a steady hold
+constexpr double ASKED_s = 0.3;                        // from a request to what it waits for
+constexpr double PULL_LEAST_N = 2.0, PULL_MOST_N = 6.0, PULL_s = 2.0, LOWERS_s = 1.0;
+constexpr double BEYOND_LEAST_mm = 0.5, BEYOND_MOST_mm = 3.0; // where the hand expects no table
+constexpr double LOW_mm = 2.0;                                // what falls so far is set down
 
 // Wrong readings of one fingertip.
 struct Wrong {
@@ -30,18 +34,44 @@ struct Wrong {
   Fault::Kind kind;
   double frames; // 0: for good
 };
-constexpr Wrong WRONG[] = {
-    {"none", Fault::Kind::nothing, 1e-9}, {"frame", Fault::Kind::nothing, 1},         {"frames", Fault::Kind::nothing, 10},
-    {"nothing", Fault::Kind::nothing, 0}, {"spike", Fault::Kind::spike, 1},           {"tared", Fault::Kind::tared, 0},
-    {"reboot", Fault::Kind::reboot, 0},   {"moved_zero", Fault::Kind::moved_zero, 0}, {"weak", Fault::Kind::weak, 0}};
+constexpr Wrong WRONG[] = {{"frame", Fault::Kind::nothing, 1},   {"frames", Fault::Kind::nothing, 10},
+                           {"nothing", Fault::Kind::nothing, 0}, {"spike", Fault::Kind::spike, 1},
+                           {"tared", Fault::Kind::tared, 0},     {"reboot", Fault::Kind::reboot, 0},
+                           {"weak", Fault::Kind::weak, 0},       {"moved_zero", Fault::Kind::moved_zero, 0}};
 
 struct Options {
-  std::string kind = "usual", gripper = gripper_models().front().model, controller = "ours", settings, wrong;
-  double later_ms = 0.0, rate_Hz = 410.0, still_s = 0.0, mass_share = 0.0;
+  std::string kind = "usual", gripper = gripper_models().front().model, controller = "ours", settings, then;
+  double later_ms = 0.0, rate_Hz = 410.0, still_s = 0.0;
   std::uint64_t seed = 1, count = 100, jobs = 2;
   std::optional<std::uint64_t> trace;
   bool faults = false, loadless = false;
 };
+
+// Instead of the kind's events, in a steady hold.
+void happens(KindTrial &trial, const Options &options, std::uint64_t n) {
+  const Wrong *wrong = find_in(WRONG, [&](const Wrong &one) { return options.then == one.name; });
+  KindOfGrasp &grasp = trial.grasp;
+  const double steady_s = grasp.lift_s + STEADY_s;
+  grasp.gone = -1;
+  grasp.events.clear();
+  Fault &fault = trial.fault.emplace();
+  fault.kind = wrong ? wrong->kind : Fault::Kind::none;
+  fault.fingers[n % 2] = true;
+  fault.state = GRIP_HOLDING;
+  fault.after_s = trial.asked_after_s = grasp.waits_s + steady_s;
+  fault.lasts_s = wrong && wrong->frames > 0 ? wrong->frames / options.rate_Hz : fault.lasts_s;
+  fault.watched_s = WATCHED_s;
+  fault.is_followed_by_pouring = false;
+  trial.asked = request_of_name(options.then);
+  Random random(options.seed, ASKED, n);
+  if (trial.asked == GRIP_REQUEST_PLACE) {
+    const double beyond_mm = random.uniform(BEYOND_LEAST_mm, BEYOND_MOST_mm);
+    grasp.events = {{Event::Kind::lower, steady_s + ASKED_s, LOWERS_s, LOWERS_s, 0.0, 0.0, beyond_mm}};
+  } else if (trial.asked == GRIP_REQUEST_HAND_OVER) {
+    const double weights = random.log_uniform(PULL_LEAST_N, PULL_MOST_N) / (GRAVITY_m_s2 * grasp.mass_kg);
+    grasp.events = {{Event::Kind::push, steady_s + ASKED_s, PULL_s, weights, random.uniform(-M_PI, M_PI)}};
+  }
+}
 
 KindTrial trial_of(const Options &options, std::uint64_t n) {
   const auto kinds = split(options.kind, ',');
@@ -58,20 +88,8 @@ KindTrial trial_of(const Options &options, std::uint64_t n) {
     trial.set_of_smaller = options.controller != "paper";
     trial.grasp.table_friction = 0.0; // both pads press alike
   }
-  for (const Wrong &wrong : WRONG) {
-    if (options.wrong == wrong.name) {
-      trial.grasp.events.clear();
-      trial.grasp.gone = -1;
-      Fault fault;
-      fault.kind = wrong.kind;
-      fault.fingers[n % 2] = true;
-      fault.state = GRIP_HOLDING;
-      fault.after_s = trial.grasp.waits_s + trial.grasp.lift_s + STEADY_s;
-      fault.lasts_s = wrong.frames > 0 ? wrong.frames / options.rate_Hz : fault.lasts_s;
-      fault.watched_s = WATCHED_s;
-      fault.is_followed_by_pouring = false;
-      trial.fault = fault;
-    }
+  if (!options.then.empty()) {
+    happens(trial, options, n);
   }
   return trial;
 }
@@ -85,9 +103,6 @@ GripSettings settings_with(const Options &options, const KindTrial &trial) {
   if (options.controller == "fixed" || options.controller == "paper") {
     values["fixed"] = still ? trial.set_N : options.controller == "fixed" ? FIXED_N : PAPER_N;
     values.erase("cap");
-  }
-  if (options.mass_share > 0.0) {
-    values["mass"] = options.mass_share * trial.grasp.mass_kg;
   }
   for (const auto &[name, value] : limits_of(split(options.settings, ','))) {
     values[name] = value;
@@ -158,6 +173,12 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
     line["before_N"] = o.failed.before_N;
     line["after_N"] = o.failed.after_N;
     line["reported"] = trouble_names(o.failed.trouble);
+    line["released"] = o.failed.released_s.has_value();
+  }
+  if (one.trial.asked && o.failed.released_s) {
+    const Event &awaited = grasp.events.front();
+    const double at_s = *o.failed.released_s;
+    line["early"] = awaited.kind == Event::Kind::lower ? grasp.inputs(at_s).lifted_mm > o.slid_mm + LOW_mm : at_s < awaited.begin_s;
   }
   if (one.trial.still_s > 0.0) {
     line["set_N"] = one.trial.set_N;
@@ -207,7 +228,6 @@ int run(int argc, char **argv) {
       ->check(CLI::IsMember({"ours", "textbook", "fixed", "paper"}))
       ->capture_default_str();
   app.add_option("--set", options.settings, "Of our settings, split by commas: margin=1.4")->type_name("NAME=VALUE");
-  app.add_option("--mass", options.mass_share, "Expected mass, of the true one")->check(CLI::NonNegativeNumber);
   const auto number = [&](const char *name, double &value, const char *unit, const char *help) {
     return app.add_option(name, value, help)->type_name(unit);
   };
@@ -216,8 +236,12 @@ int run(int argc, char **argv) {
   app.add_flag("--loadless", options.loadless, "Fingertips do not know their pads: no tangential force");
   number("--still", options.still_s, "S", "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
       ->check(CLI::PositiveNumber);
-  app.add_option("--wrong", options.wrong, "Instead of events: what one fingertip reports wrongly in a steady hold")
-      ->check(CLI::IsMember(texts_of(WRONG, [](const Wrong &one) { return one.name; })));
+  std::vector<std::string> happenings = {"none", "place", "hand_over"};
+  for (const Wrong &wrong : WRONG) {
+    happenings.emplace_back(wrong.name);
+  }
+  app.add_option("--then", options.then, "Instead of events, in a steady hold: what one fingertip reports wrongly, or a request")
+      ->check(CLI::IsMember(happenings));
   app.add_option("--seed", options.seed, "Another set of grasps; 1 to 999 are there to choose constants by, the report judges by others")
       ->capture_default_str();
   app.add_option("--count", options.count, "Grasps")->check(CLI::Range(1, 1000000))->capture_default_str();

@@ -47,7 +47,6 @@ constexpr std::uint64_t CHUNK_LIMIT = 1 << 20;
 constexpr double NEVER_s = std::numeric_limits<double>::infinity();
 constexpr double MOVES_s = 2.5e-4; // between two samples of the gripper
 constexpr double PAD_SD = 0.08;    // of cast pads: the report's part truth
-constexpr double MORE_LOAD = 1.1, MORE_LOAD_N = 0.1;
 
 // A fingertip that is an emulated board, from the host's end of its USB line: it gets its pad's profile and its calibration first, then it
 // streams its readings. Its clock is fitted from commands and their acknowledgements, as the tool does it, on the emulated time.
@@ -166,7 +165,7 @@ public:
         return;
       }
       controller_->take_touch(finger, touch);
-      reports_.push_back({arrived_s, measured_s, finger, (touch.flags & CONTACT_FLAG_SLIDING) != 0, std::hypot(touch.qx_N, touch.qy_N)});
+      reports_.push_back({arrived_s, measured_s, (touch.flags & CONTACT_FLAG_SLIDING) != 0});
       frames_[finger]++;
       loads_[finger] += (touch.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
       step_controller();
@@ -206,7 +205,6 @@ public:
   bool over() const { return over_; }
 
   // What happened, and when, of the first slip after the lift, as report/grasp/emulated_grasp.py names it; null: never.
-  // reported_by: "SLIDING", or "load" if a fingertip's load rose by a tenth and 0.1 N.
   ordered_json summary() const {
     ordered_json out = {
         {"dropped", world_.is_dropped()}, {"slid_mm", world_.slid_mm()}, {"asked_s", to_us(asked_s_)}, {"holding_s", to_us(holds_s_)},
@@ -222,9 +220,7 @@ public:
 private:
   struct Report {
     double arrived_s, measured_s;
-    std::size_t finger;
     bool slides;
-    double load_N;
   };
   struct Change {
     double at_s, width_mm;
@@ -259,16 +255,9 @@ private:
   }
 
   ordered_json answer_to(const Slip &slip) const {
-    std::array<double, 2> load_N{};
-    const Report *first = nullptr;
-    for (const Report &report : reports_) {
-      if (report.arrived_s < slip.begin_s) {
-        load_N[report.finger] = report.load_N;
-      } else if (report.slides || report.load_N > MORE_LOAD * load_N[report.finger] + MORE_LOAD_N) {
-        first = &report;
-        break;
-      }
-    }
+    const auto first = std::find_if(reports_.begin(), reports_.end(),
+                                    [&](const Report &report) { return report.slides && report.arrived_s >= slip.begin_s; });
+    const bool is_reported = first != reports_.end();
     // The first step that closes further than the width before it.
     const auto closed = [&](const std::vector<Change> &changes) {
       double width_mm = NEVER_s;
@@ -283,11 +272,8 @@ private:
     const auto in_ms = [](double s) { return to_us(s, 1e3); };
     return {{"begin_s", to_us(slip.begin_s)},
             {"way_mm", slip.way_mm},
-            {"reported_by", !first          ? ordered_json(nullptr)
-                            : first->slides ? "SLIDING"
-                                            : "load"},
-            {"measured_ms", in_ms(first ? first->measured_s - slip.begin_s : NEVER_s)},
-            {"sent_ms", in_ms(first ? first->arrived_s - slip.begin_s : NEVER_s)},
+            {"measured_ms", in_ms(is_reported ? first->measured_s - slip.begin_s : NEVER_s)},
+            {"sent_ms", in_ms(is_reported ? first->arrived_s - slip.begin_s : NEVER_s)},
             {"answered_ms", in_ms(closed(commanded_))},
             {"asked_ms", in_ms(closed(asked_))},
             {"moved_ms", in_ms(closed(moved_))},

@@ -91,6 +91,21 @@ private:
   double next_s_, known_s_ = 0.0;
 };
 
+// How often a commanded width turns.
+struct Turns {
+  int count = 0, direction = 0;
+  double mm = 0.0;
+  void sample(double to_mm, bool counts) {
+    if (!counts || (direction != 0 && direction * (to_mm - mm) >= 0.0)) {
+      mm = to_mm; // goes on
+    } else if (std::abs(to_mm - mm) >= SWINGS_mm) {
+      count += direction != 0;
+      direction = to_mm > mm ? 1 : -1;
+      mm = to_mm;
+    }
+  }
+};
+
 // A force that is to be held.
 class SetPoint {
 public:
@@ -107,26 +122,20 @@ public:
       squares_ += off * off;
       samples_++;
     }
-    if (t_s - touched_s < 0.5 * trial_.still_s) {
-      width_mm_ = width_mm;
-    } else if (std::abs(width_mm - width_mm_) > SWINGS_mm) {
-      const int direction = width_mm > width_mm_ ? 1 : -1;
-      reversals_ += direction_ == -direction;
-      direction_ = direction;
-      width_mm_ = width_mm;
-    }
+    turns_.sample(width_mm, t_s - touched_s >= 0.5 * trial_.still_s);
   }
   void fill(KindOutcome &outcome) const {
     outcome.settle_s = settle_s_;
     outcome.rms = samples_ > 0 ? std::sqrt(squares_ / samples_) : 0.0;
-    outcome.reversals = reversals_;
+    outcome.reversals = turns_.count;
   }
 
 private:
   const KindTrial &trial_;
-  double near_s_ = NEVER_s, width_mm_ = 0.0, squares_ = 0.0;
+  double near_s_ = NEVER_s, squares_ = 0.0;
+  Turns turns_;
   std::optional<double> settle_s_;
-  int samples_ = 0, direction_ = 0, reversals_ = 0;
+  int samples_ = 0;
 };
 
 class KindRun {
@@ -245,6 +254,9 @@ private:
       outcome_.failed.trouble |= report_.trouble;
       outcome_.failed.state = report_.state;
       outcome_.failed.gripper_fault = report_.gripper_fault;
+      if (report_.state == GRIP_RELEASE && !outcome_.failed.released_s) {
+        outcome_.failed.released_s = since_lift_s();
+      }
     }
     if (trial_.asked && !has_asked_ && t_s_ >= held_s_ + trial_.asked_after_s) {
       has_asked_ = true;
@@ -325,15 +337,7 @@ private:
       const auto [low_N, high_N] = std::minmax(report_.finger_N[0], report_.finger_N[1]);
       set_point_.sample(t_s_, trial_.set_of_smaller ? low_N : 0.5 * (low_N + high_N), sent_mm, touched_s_);
     }
-    if (since_s < grasp_.steady_s) {
-      turned_mm_ = sent_mm;
-    } else if (direction_ * (sent_mm - turned_mm_) >= 0.0 && direction_ != 0) {
-      turned_mm_ = sent_mm; // goes on
-    } else if (std::abs(sent_mm - turned_mm_) >= SWINGS_mm) {
-      reversals_ += direction_ != 0;
-      direction_ = sent_mm > turned_mm_ ? 1 : -1;
-      turned_mm_ = sent_mm;
-    }
+    turns_.sample(sent_mm, since_s >= grasp_.steady_s);
     if (trace_) {
       const Vector one = cell_.load_N(0), other = cell_.load_N(1);
       trace_({{"t_s", t_s_},
@@ -355,7 +359,7 @@ private:
     outcome_.slid_mm = cell_.slid_mm();
     outcome_.crushed = outcome_.peak_N > grasp_.crushes_N;
     outcome_.catches = slips_.slips;
-    outcome_.hunts = !outcome_.dropped && reversals_ / (grasp_.ends_s - grasp_.steady_s) >= HUNTS_s;
+    outcome_.hunts = !outcome_.dropped && turns_.count / (grasp_.ends_s - grasp_.steady_s) >= HUNTS_s;
     if (!margins_.empty()) {
       const auto middle = margins_.begin() + static_cast<std::ptrdiff_t>(margins_.size() / 2);
       std::nth_element(margins_.begin(), middle, margins_.end());
@@ -389,8 +393,8 @@ private:
   bool over_ = false, is_between_, is_taken_ = false, has_asked_ = false;
   double t_s_ = 0.0, stepped_s_ = 0.0, sample_s_ = 0.0, answered_s_ = 0.0, touched_s_ = NEVER_s;
   double held_s_ = NEVER_s, lift_s_ = NEVER_s, slick_s_ = NEVER_s, slick_share_ = 1.0;
-  double least_N_ = 0.0, turned_mm_ = 0.0, began_mm_ = 0.0;
-  int reversals_ = 0, direction_ = 0;
+  double least_N_ = 0.0, began_mm_ = 0.0;
+  Turns turns_;
 };
 
 } // namespace

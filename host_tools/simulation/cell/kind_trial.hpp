@@ -78,6 +78,7 @@ struct Failed {
   std::uint32_t trouble = 0;            // all that was ever on
   std::uint8_t state = 0;               // at the end
   std::uint8_t gripper_fault = 0;
+  std::optional<double> released_s = {}; // since the lift began, when it was going to open
 };
 
 struct KindOutcome {

@@ -208,8 +208,8 @@ KindOfGrasp::Inputs KindOfGrasp::inputs(double t_s) const {
     case Event::Kind::slick: inputs.friction_share *= 1.0 - event.amount * way_of(share); break;
     case Event::Kind::jerk: hand_m_s2 = lasts ? event.amount * std::sin(2.0 * M_PI * share) : 0.0; break;
     case Event::Kind::lower:
-      inputs.lifted_mm *= 1.0 - way_of(share);
-      inputs.hand_m_s2.y -= 1e-3 * lift_mm * acceleration_of(share) / (event.seconds * event.seconds);
+      inputs.lifted_mm -= (inputs.lifted_mm + event.beyond_mm) * way_of(share);
+      inputs.hand_m_s2.y -= 1e-3 * (lift_mm + event.beyond_mm) * acceleration_of(share) / (event.seconds * event.seconds);
       inputs.table = inputs.table || share > 0.0;
     }
     inputs.hand_m_s2.x += hand_m_s2 * way.x;

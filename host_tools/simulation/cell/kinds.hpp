@@ -54,8 +54,8 @@ struct Event {
   };
   Kind kind;
   double begin_s, seconds, amount;
-  double angle_rad = 0.0; // from upwards
-  double rate_Hz = 0.0;
+  double angle_rad = 0.0;                // from upwards
+  double rate_Hz = 0.0, beyond_mm = 0.0; // of vibrate; of lower, below where the hand began
 };
 const char *name_of(Event::Kind kind);
 

@@ -42,8 +42,8 @@ else:
         late = options["--gripper"] == "sts3215"
         each = [{**one, "set_N": 9.0, "settle_s": 1.4 if late else 0.4, "rms_percent": 1.0, "reversals": 0} for one in each]
         each[0]["reversals"] = 4
-    if "--wrong" in options:
-        each = [{**one, "before_N": 2.0, "after_N": 2.9, "reported": ""} for one in each]
+    if "--then" in options:
+        each = [{**one, "before_N": 2.0, "after_N": 2.9, "reported": "", "released": i > 0, "early": i == 1} for i, one in enumerate(each)]
         each[0]["after_N"] = 3.1
     found = {"each": each}
 print(json.dumps(found))
@@ -79,6 +79,8 @@ class Grasp(unittest.TestCase):
             self.assertIs(met[name], False, name)
         self.assertEqual((found["limit_cycles"], found["over_cap"]), (6, 3))
         self.assertEqual((found["one_bad_frame_squeezed"], found["lasting_bad_squeezed_percent"]), (9, 10.0))
+        requests = [found[name] for name in ("place_rises", "pulled_against_over_1.5x", "placed_opened_percent", "handed_over_percent")]
+        self.assertEqual(requests, [3, 3, 93.333, 93.333])
         kinds = {(row["row"], row["gripper"], row["controller"]): row["grasps"] for row in found["kinds"]}
         for row, grasps in {
             ("usual and rough", "2f85", "paper"): 30,
@@ -109,7 +111,7 @@ class Grasp(unittest.TestCase):
     def test_what_is_written_to_read(self):
         self.run_tool("--grasps", "5")
         text = (self.out / "grasp.md").read_text()
-        words = "Simulated rubber/Nothing was checked on hardware/no load estimated/## By kind/## Set forces/## Wrong readings/## Faults/both frozen | holding | True"
+        words = "Simulated rubber/Nothing was checked on hardware/no load estimated/## By kind/## Set forces/## In a steady hold/## Faults/both frozen | holding | True"
         for each in words.split("/"):
             self.assertIn(each, text)
 

@@ -207,6 +207,14 @@ static GripWorld blind_world(double sigma_mm) {
   return world;
 }
 
+static GripWorld blind_carrier(double sigma_mm, double load_N) {
+  GripWorld world = blind_world(sigma_mm);
+  world.grasp();
+  world.pull(load_N, 0.3);
+  world.run(1.0);
+  return world;
+}
+
 // Without a tangential force the place shows the load; one frame shows nothing, and a place that drifts back opens nothing.
 TEST(Grip, IsAsFirmAsThePlaceShows) {
   for (const auto &[load_N, sigma_mm] : {std::pair(0.3, 6.0), {0.8, 6.0}, {1.5, 6.0}, {0.8, 9.0}}) {
@@ -234,10 +242,7 @@ TEST(Grip, IsAsFirmAsThePlaceShows) {
 
 // Places that move apart show an object that tilts. Fingertips may be mounted another way: a third of it may be a load.
 TEST(Grip, ATiltIsNoLoad) {
-  GripWorld world = blind_world(8.0);
-  world.grasp();
-  world.pull(0.5, 0.3);
-  world.run(1.0);
+  GripWorld world = blind_carrier(8.0, 0.5);
   const double before_N = world.force_N;
   for (int i = 0; i < 100; i++) {
     world.moved_mm = {0.005 * i, -0.005 * i};
@@ -250,10 +255,7 @@ TEST(Grip, ATiltIsNoLoad) {
 
 // What moves further than friction holds slides: the grip grows, and what has slid is no load afterwards.
 TEST(Grip, APlaceBeyondFrictionSlides) {
-  GripWorld world = blind_world(6.0);
-  world.grasp();
-  world.pull(0.5, 0.3);
-  world.run(1.0);
+  GripWorld world = blind_carrier(6.0, 0.5);
   const double before_N = world.force_N;
   for (int i = 1; i <= 50; i++) {
     world.moved_mm = {0.1 * i, 0.1 * i};
@@ -268,6 +270,24 @@ TEST(Grip, APlaceBeyondFrictionSlides) {
   world.run(3.0);
   EXPECT_EQ(world.report.state, GRIP_HOLDING);
   EXPECT_LT(world.force_N, 0.8 * world.settings.cap_N);
+}
+
+// While a table presses the width stays, whatever the place does, until the load is gone. A slide that goes with a pull raises nothing.
+TEST(Grip, PlacesAndHandsOverByThePlace) {
+  for (const bool places : {true, false}) {
+    GripWorld world = blind_carrier(6.0, 0.8);
+    const double before_N = world.force_N;
+    ASSERT_TRUE(world.grip.request(places ? GRIP_REQUEST_PLACE : GRIP_REQUEST_HAND_OVER));
+    world.peak_N = 0.0;
+    world.moved_mm.fill(places ? 3.0 : 0.0);
+    world.run(0.5);
+    EXPECT_EQ(world.report.state, places ? GRIP_PLACING : GRIP_HANDING);
+    world.moved_mm = {};
+    world.pull(places ? -0.4 : 2.2, 0.1);
+    world.run(0.1);
+    EXPECT_EQ(world.report.state, GRIP_RELEASE);
+    EXPECT_LT(world.peak_N, 1.05 * before_N) << places;
+  }
 }
 
 // Where there is no place either, noise does not open the gripper.
