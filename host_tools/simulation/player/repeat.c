@@ -48,6 +48,7 @@ void repeat_frame(const struct wire_packet *packet, bool held, struct wire_conta
   app.found.frame.valid = raw->valid;
   app.found.frame.saturated = raw->saturated;
   app.found.frame.doubtful = raw->doubtful;
+  app.found.frame.unsettled = raw->doubtful == raw->valid ? raw->valid : 0; /* what has moved is doubted whole (scan/readings.h) */
   memcpy(app.found.frame.pressure_Pa_q10, raw->pressure_Pa_q10, sizeof app.found.frame.pressure_Pa_q10);
   app_process_frame(&app, 0);
   const struct wire_stages stages = contact->stages;
