@@ -132,7 +132,7 @@ def summary_of_held(each):
         "against": sum(one["after_N"] > AGAINST * one["before_N"] for one in held),
         "opened_percent": percent(sum(not one["early"] for one in released), len(held)),
         "opened_early": sum(one["early"] for one in released),
-        "dropped": sum(one["dropped"] for one in held),
+        "dropped": sum(one["dropped"] and not one["released"] for one in held),
         "reported": sorted({word for one in held for word in one["reported"].split()}),
     }
 
