@@ -177,15 +177,16 @@ static int32_t pulled_q14(int32_t ratio_x_q26, int32_t ratio_y_q26, int32_t sd_q
   return scaled_to_fixed(quotient_of(odds, sum_of(one, odds)), 14);
 }
 
-/* Place and tangential force are the means of those of a contact that is pulled as estimated and of one that is not,
- * each by how likely it is. The standard deviations have what lies between the two. What the place's loses where nothing pulls is
- * of the same misfit as the place's: else what is left would be mostly the difference of the two factors. Where the zero is that of the
- * first touch, a tangential force of 0 is not what is likely, and the estimate stays. */
+/* The place is the mean of that of a contact that is pulled as estimated and of one that is not,
+ * each by how likely it is. The standard deviation has what lies between the two. What it loses where nothing pulls is
+ * of the same misfit as the place's: else what is left would be mostly the difference of the two factors. */
 static void weigh_force(const struct tangential_settings *settings, struct fit_tangential *found) {
-  const int32_t force_N_q24 = fixed_clamp(fit_fixed(found->force_N, 24), FORCE_MIN_N_Q24, INT32_MAX);
+  int32_t force_N_q24 = fit_fixed(found->force_N, 24);
+  force_N_q24 = force_N_q24 < FORCE_MIN_N_Q24 ? FORCE_MIN_N_Q24 : force_N_q24;
   const int32_t ratio_x_q26 = per_force_q26(found->qx_N, force_N_q24);
   const int32_t ratio_y_q26 = per_force_q26(found->qy_N, force_N_q24);
-  const int32_t sd_q26 = fixed_clamp(per_force_q26(found->q_sd_N, force_N_q24), RATIO_SD_MIN_Q26, INT32_MAX);
+  int32_t sd_q26 = per_force_q26(found->q_sd_N, force_N_q24);
+  sd_q26 = sd_q26 < RATIO_SD_MIN_Q26 ? RATIO_SD_MIN_Q26 : sd_q26;
   const int32_t pulled = pulled_q14(ratio_x_q26, ratio_y_q26, sd_q26);
   const int32_t not_pulled = (1 << 14) - pulled;
   const int32_t *moved = found->moved_q20_mm;
@@ -199,15 +200,6 @@ static void weigh_force(const struct tangential_settings *settings, struct fit_t
   of_force = scaled_mul(of_force, scaled_from(fit_fixed(found->variance_per_pull, 20), -20));
   of_force.mantissa = -of_force.mantissa;
   const struct scaled share = {not_pulled, -14}, other = {pulled, -14};
-  if (not_pulled != 0 && !settings->from_touch) {
-    const struct scaled apart =
-        scaled_mul(squares_of(ratio_x_q26, ratio_y_q26, 26), (struct scaled){not_pulled, -15}); /* along each axis */
-    const struct scaled sd = scaled_sqrt(scaled_mul(sum_of(squares_of(sd_q26, 0, 26), apart), other));
-    const float likely = fit_float(pulled, -14);
-    found->qx_N *= likely;
-    found->qy_N *= likely;
-    found->q_sd_N = found->force_N * fit_float(sd.mantissa, sd.exponent);
-  }
   const struct scaled between = scaled_mul(squares_of(dx_q20, dy_q20, 20), other);
   variance = sum_of(variance, scaled_mul(sum_of(between, of_force), share));
   const bool small = sum_of(variance, (struct scaled){-sixteenth.mantissa, sixteenth.exponent}).mantissa < 0;
@@ -234,40 +226,41 @@ static bool settle_zero(struct tangential_history *history, uint64_t t_us, float
 
 void tangential_update(struct tangential_history *history, const struct tangential_settings *settings, const struct contact_input *input,
                        struct contact_result *result, struct tangential_force *force) {
-  struct fit_tangential found;
+  struct fit_tangential mended;
+  const struct fit_tangential *found = &mended;
   memset(force, 0, sizeof *force);
   if (!input->contact) {
     tangential_reset(history);
   }
   if (!input->tangential || !input->tangential->valid || !(input->tangential->force_N > 0.0f) ||
-      !without_edges(settings, input->tangential, &found)) {
+      !without_edges(settings, input->tangential, &mended)) {
     return;
   }
-  weigh_force(settings, &found);
-  float qx_N = found.qx_N, qy_N = found.qy_N;
+  weigh_force(settings, &mended);
+  float qx_N = found->qx_N, qy_N = found->qy_N;
   if (settings->from_touch) {
-    if (!settle_zero(history, input->t_us, qx_N / found.force_N, qy_N / found.force_N)) {
+    if (!settle_zero(history, input->t_us, qx_N / found->force_N, qy_N / found->force_N)) {
       return;
     }
-    qx_N -= history->zero_x * found.force_N;
-    qy_N -= history->zero_y * found.force_N;
+    qx_N -= history->zero_x * found->force_N;
+    qy_N -= history->zero_y * found->force_N;
     result->flags |= CONTACT_FLAG_TANGENTIAL_FROM_TOUCH;
   }
   const float size_N = fit_quadrature(fabsf(qx_N), 1.0f, fabsf(qy_N), 1.0f);
   const float scale = settings->force_scale * settings->tangential_scale;
   const float scale_sd = settings->force_scale * settings->tangential_scale_sd;
-  force->x_mm = found.x_mm;
-  force->y_mm = found.y_mm;
-  force->location_sd_mm = found.location_sd_mm;
-  force->force_N = settings->force_scale * found.force_N;
-  force->force_sd_N = fit_quadrature(settings->force_scale, found.force_sd_N, settings->force_scale_sd, found.force_N);
+  force->x_mm = found->x_mm;
+  force->y_mm = found->y_mm;
+  force->location_sd_mm = found->location_sd_mm;
+  force->force_N = settings->force_scale * found->force_N;
+  force->force_sd_N = fit_quadrature(settings->force_scale, found->force_sd_N, settings->force_scale_sd, found->force_N);
   force->qx_N = scale * qx_N;
   force->qy_N = scale * qy_N;
-  force->q_sd_N = fit_quadrature(scale, found.q_sd_N, scale_sd, size_N);
-  force->ratio = settings->tangential_scale * size_N / found.force_N;
+  force->q_sd_N = fit_quadrature(scale, found->q_sd_N, scale_sd, size_N);
+  force->ratio = settings->tangential_scale * size_N / found->force_N;
   result->flags |= CONTACT_FLAG_TANGENTIAL_VALID;
-  result->flags &= ~(uint32_t)(CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_ELONGATED | (found.at_corner ? 0 : CONTACT_FLAG_MODEL));
-  result->flags |= found.elongated ? (uint32_t)CONTACT_FLAG_ELONGATED : 0;
+  result->flags &= ~(uint32_t)(CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_ELONGATED | (found->at_corner ? 0 : CONTACT_FLAG_MODEL));
+  result->flags |= found->elongated ? (uint32_t)CONTACT_FLAG_ELONGATED : 0;
   if (force->location_sd_mm > settings->location_sd_limit_mm) {
     result->flags |= CONTACT_FLAG_UNCERTAIN;
   }

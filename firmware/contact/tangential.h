@@ -39,10 +39,10 @@ struct tangential_history {
   float zero_x, zero_y; /* Q / F */
 };
 
-/* All zeros unless TANGENTIAL_VALID. Place and tangential force are the means of those of a contact that is pulled as estimated and of one
- * that nothing pulls, each by how likely it is: a small tangential force may be none. location_sd_mm and q_sd_N have what lies between the
- * two. So of an estimate of two standard deviations less than a half is reported, of one of four nearly nine tenths. With
- * TANGENTIAL_FROM_TOUCH it is as estimated. Pictures draw one from two standard deviations on. */
+/* All zeros unless TANGENTIAL_VALID. The place is the mean of that of a contact that is pulled as estimated and of one that nothing pulls,
+ * each by how likely it is: a small tangential force may be none, and chance tangential forces would move it. location_sd_mm has what lies
+ * between the two. The tangential force itself is reported as estimated, however small: its mean is right, and who controls by it has
+ * q_sd_N. Pictures draw one from two standard deviations on. */
 struct tangential_force {
   float x_mm, y_mm, location_sd_mm;
   float force_N, force_sd_N;

@@ -225,7 +225,8 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   struct scaled square = scaled_add(scaled_mul(e1, e1), scaled_mul(e2, e2));
   struct scaled amplitude = fit_scaled_from(at->amplitude_q24, -24);
   struct scaled round = scaled_mul(amplitude, fit_scaled_from(ONE_Q26 / 4 + at->t_q26, -26)); /* A v */
-  struct scaled longest = fit_scaled_short(scaled_mul((struct scaled){pad->long_most_q15, -15}, round));
+  struct scaled longest = scaled_mul((struct scaled){pad->long_most_q15, -15}, round);
+  longest = fit_scaled_short(longest);
   if (exceeds(square, scaled_mul(longest, longest))) {
     return;
   }
@@ -233,12 +234,11 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   const uint32_t outside = is_outside(pad, at->x_q26, COLUMNS) + is_outside(pad, at->y_q26, ROWS);
   const int32_t least_q16 = outside ? MISFIT_LEAST_OUTSIDE_Q16 : MISFIT_LEAST_Q16, misfit_q16 = chi_square_q16 >> MISFIT_SHIFT;
   const int32_t factor_q16 = misfit_q16 < least_q16 ? least_q16 : misfit_q16, lacks_q16 = factor_q16 < 1 << 16 ? (1 << 16) - factor_q16 : 0;
-  /* Of the gains' part remains where chi^2 is small: of a tangential force half, or three eighths after a calibration, which leaves less of
-   * the errors that rise over the pad; of a location all, or none. */
-  const int32_t gains_q16 = (lacks_q16 * problem->by_gains_q12) >> 12;
-  const int32_t pull_q16 = factor_q16 + (problem->own ? 3 * gains_q16 >> 3 : gains_q16 >> 1);
-  struct scaled pull_variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(pull_q16, -16)));
-  variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(problem->own ? factor_q16 : factor_q16 + gains_q16, -16)));
+  /* Of the gains' part remains where chi^2 is small: of a tangential force half; of a location all, or none after a
+   * calibration, which leaves no errors that rise over the pad. */
+  const int32_t half_gains_q16 = (lacks_q16 * problem->by_gains_q12) >> 13;
+  struct scaled pull_variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(factor_q16 + half_gains_q16, -16)));
+  variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(problem->own ? factor_q16 : factor_q16 + 2 * half_gains_q16, -16)));
   int32_t x_q8, y_q8;
   struct scaled pulls = scaled_add(variance_of(room, outcome, PULL_X, 0, NULL), variance_of(room, outcome, PULL_Y, 0, NULL));
   pulls.exponent -= 1;

@@ -20,7 +20,7 @@ constexpr double DELAY_SHARE = 0.05; // weight of a frame in the moving average 
 constexpr int ZERO_FRAMES = 3;
 constexpr double LOAD_SD_LEAST_N = 0.06;
 constexpr double SHARED_N = 0.3; // a load whose share of both has a meaning
-constexpr double SURE_SDS = 0.8; // of a load that may be none: what was estimated at two is reported so (contact/tangential.h)
+constexpr double SURE_SDS = 2.0;
 // A force whose standard deviation is a larger share of it is no measurement. That of a long or wide contact is measured: only how far it
 // reaches beyond the pad is not.
 constexpr double FORCE_SD_MOST = 1.0, WIDE_mm = 15.0;

@@ -91,7 +91,7 @@ TEST(a_small_load_may_be_none_and_the_place_knows_it) {
     double way_mm = 2.5 - (double)load.x_mm;
     double share = i == 0 ? 1.0 : way_mm / whole_mm;
     TEST_ASSERT_EQUAL_FLOAT(-7.0f, load.y_mm);
-    TEST_ASSERT_FLOAT_WITHIN(0.002f, found.qx_N - 4.0f / (float)MOVED_mm * (float)way_mm, load.qx_N);
+    TEST_ASSERT_EQUAL_FLOAT(found.qx_N, load.qx_N); /* the load itself is as estimated */
     TEST_ASSERT_TRUE(share >= 0.0 && share <= 1.0);
     TEST_ASSERT_TRUE(i < 2 || share <= before + 1e-3);
     TEST_ASSERT_TRUE(i > 2 || share > 0.7);   /* half a standard deviation */
@@ -118,23 +118,23 @@ TEST(a_misfit_widens_what_goes_as_it_widens_the_place) {
 
 /* Half of the contacts are pulled, by 0.1 of the force along each axis. Errors of the load and of the place go
  * together, and their standard deviation is known as well as 15 readings less 8 unknowns tell it. */
-TEST(places_and_loads_are_nearer_than_with_any_load_or_none) {
+TEST(places_are_nearer_than_with_any_load_or_none) {
   enum { CONTACTS = 20000 };
   const double sd = 0.03, own_mm = 0.05, force_N = 4.0;
   struct random random = {UINT64_C(0x6C6F6164)};
   use_moved();
-  double mean = 0.0, as_estimated = 0.0, of_none = 0.0, said = 0.0, pull_mean = 0.0, pull_said = 0.0;
+  double mean = 0.0, as_estimated = 0.0, of_none = 0.0, said = 0.0;
   int within = 0, within_2 = 0;
   for (int i = 0; i < CONTACTS; i++) {
     double square = 0.0;
     for (int k = 0; k < 6; k++) {
       square += pow(random_normal(&random), 2) / 6.0;
     }
-    double told = sd * sqrt(square), q[2], pull[2], off_mm[2], none_mm[2];
+    double told = sd * sqrt(square), q[2], off_mm[2], none_mm[2];
+    int pulled = i % 2;
     for (int axis = 0; axis < 2; axis++) {
       double error = sd * random_normal(&random);
-      pull[axis] = i % 2 * 0.1 * random_normal(&random);
-      q[axis] = pull[axis] + error;
+      q[axis] = pulled * 0.1 * random_normal(&random) + error;
       off_mm[axis] = MOVED_mm * error + own_mm * random_normal(&random);
       none_mm[axis] = off_mm[axis] - MOVED_mm * q[axis];
     }
@@ -144,8 +144,6 @@ TEST(places_and_loads_are_nearer_than_with_any_load_or_none) {
     found.x_mm = (float)off_mm[0];
     found.y_mm = (float)off_mm[1];
     update(0);
-    pull_mean += (pow((double)load.qx_N / force_N - pull[0], 2) + pow((double)load.qy_N / force_N - pull[1], 2)) / CONTACTS;
-    pull_said += 2.0 * pow((double)load.q_sd_N / force_N, 2) / CONTACTS;
     double off = hypot((double)load.x_mm, (double)load.y_mm);
     mean += off * off / CONTACTS;
     as_estimated += (pow(off_mm[0], 2) + pow(off_mm[1], 2)) / CONTACTS;
@@ -156,8 +154,6 @@ TEST(places_and_loads_are_nearer_than_with_any_load_or_none) {
   }
   TEST_ASSERT_TRUE(mean < 0.8 * as_estimated);
   TEST_ASSERT_TRUE(mean < 0.2 * of_none);
-  TEST_ASSERT_TRUE(pull_mean < 0.8 * 2.0 * sd * sd);
-  TEST_ASSERT_DOUBLE_WITHIN(0.25 * pull_mean, pull_mean, pull_said);
   TEST_ASSERT_DOUBLE_WITHIN(0.25 * mean, mean, said);
   TEST_ASSERT_INT_WITHIN(CONTACTS / 10, CONTACTS * 66 / 100, within);
   TEST_ASSERT_INT_WITHIN(CONTACTS / 30, CONTACTS * 96 / 100, within_2);
@@ -175,7 +171,6 @@ static void use_edges(const struct pad_edges *edges) {
 TEST(edges_are_taken_back) {
   found.x_mm = 2.5f;
   found.y_mm = -7.5f;
-  found.q_sd_N = 0.02f; /* the force is sure */
   const struct pad_edges edges = {
       .ratio_x = {0.25f, 0.0f, 0.0f},
       .ratio_y = {0.0f, 0.0f, 0.25f},
@@ -195,7 +190,7 @@ TEST(edges_are_taken_back) {
   TEST_ASSERT_FLOAT_WITHIN(1e-5f, -0.115625f * 3.2f, load.qy_N);
   TEST_ASSERT_FLOAT_WITHIN(1e-5f, 2.5f - 0.5f - 0.5f, load.x_mm);
   TEST_ASSERT_FLOAT_WITHIN(1e-5f, -7.5f + 0.421875f + 0.115625f * 0.5f, load.y_mm);
-  TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.032f, 0.032f, load.q_sd_N); /* 0.02 / (1.25 0.5) */
+  TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.064f, 0.064f, load.q_sd_N); /* 0.04 / (1.25 0.5) */
 }
 
 TEST(a_load_that_edges_hide_is_not_told) {
