@@ -29,7 +29,7 @@ class Calibrate(unittest.TestCase):
         cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
         cls.scenario = cls.folder / "placements.csv"
         twin = [f"{OPTIONS.build}/host_tools/simulation/twin/twin", "scenario", "placements", "-o", cls.scenario]
-        pad = options(gain=10, seed=41, pad=7, cache=f"{OPTIONS.build}/contact_tables")
+        pad = options(effects="gain=10", seed=41, pad=7, cache=f"{OPTIONS.build}/contact_tables")
         subprocess.run([*twin, *pad], check=True, stdout=subprocess.DEVNULL)
 
     def start(self):
