@@ -12,7 +12,10 @@ const [images, fingertip, command_frame] = process.argv.slice(2);
 
 test("the datasheet's example comes out of the image", () => {
   const { codes, rows, wrong } = streamExample(images, { fingertip, command_frame });
-  assert.ok(codes.every((code) => Math.min(Math.abs(code - D1), Math.abs(code - D2)) < 4), `the codes of the example: ${codes}`);
+  assert.ok(
+    codes.every((code) => Math.min(Math.abs(code - D1), Math.abs(code - D2)) < 4),
+    `the codes of the example: ${codes}`,
+  );
   assert.ok(rows.length > 50, `${rows.length} rows`);
   const last = rows.at(-1);
   // In the example they rest at 4 bar: no air, so the array is doubtful.
