@@ -437,10 +437,10 @@ def line_fields_hpp(line):
 
     later = line.later()
     lines += [
-        "/* Sets of columns that came later, one after the other; a recording has so many of them. */",
+        "/* Sets of columns that came later, one after the other; a recording has the first N of them. */",
         f"inline constexpr int LATER_SETS = {len(later)};",
         "",
-        "/* Flags of columns that one with so many of these sets has not. */",
+        "/* Flags of columns that a recording with N of these sets lacks. */",
         "inline constexpr std::uint32_t flags_beyond(int sets) {",
         "  std::uint32_t flags = 0;",
     ]

@@ -50,7 +50,7 @@ def protocol_parts(line):
 
 
 def protocol_md(line, text):
-    """The page with its tables replaced. Each stands behind a mark "<!-- line.toml: NAME -->" and ends with an empty line."""
+    """The page with its tables replaced. Each follows a mark "<!-- line.toml: NAME -->" and ends with an empty line."""
     for name, rows in protocol_parts(line).items():
         mark = f"<!-- line.toml: {name} -->\n"
         if text.count(mark) != 1:

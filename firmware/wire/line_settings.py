@@ -204,7 +204,7 @@ def page_settings(line, text_of):
         for value in setting.values:
             span = "null" if value.choices else f"[{value.range['min'] / value.per:.12g}, {value.range['max'] / value.per:.12g}]"
             lines += [
-                f"      {{ field: '{value.field.name}', info: '{value.info}', say: {text_of(value.title)}, per: {value.per}, whole: {'true' if value.whole else 'false'}, "
+                f"      {{ field: '{value.field.name}', info: '{value.info}', title: {text_of(value.title)}, per: {value.per}, whole: {'true' if value.whole else 'false'}, "
                 f"span: {span}, choices: {value.choices or 'null'}, words: {value.words or 'null'}, unlessGiven: {'null' if value.default is None else value.default} }},"
             ]
         lines += ["    ],", "  },"]

@@ -111,7 +111,7 @@ class Generator(unittest.TestCase):
         self.assertIn("hold_ms: int | None", texts["host_tools/python/fingertip/line.py"])
         self.assertIn("hold_ms", output["INFO_KEYS"])
         self.assertIn("        hold_ms: 7 to 70.\n", output["Settable"].set.__doc__)
-        page = "field: 'hold_ms', info: 'hold_ms', say: 'Hold', per: 1, whole: true, span: [7, 70]"
+        page = "field: 'hold_ms', info: 'hold_ms', title: 'Hold', per: 1, whole: true, span: [7, 70]"
         self.assertIn(page, texts["host_tools/web/src/line/line_facts.ts"])
 
     def test_the_longest_frame_is_that_of_the_longest_body(self):

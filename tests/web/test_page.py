@@ -2,7 +2,7 @@
 
 usage: test_page.py --build BUILD --image FILE.bin --node NODE [--pictures] [unittest arguments]
 
-With --pictures Looks writes the reference pictures again, and that of the manual: look at them. Exit status 77: there is no such browser here, or it may get no ports.
+With --pictures Appearance writes the reference pictures again, and that of the manual: check them by eye. Exit status 77: there is no such browser here, or it may get no ports.
 
 real time: a browser, whose fingertips are on pseudo-terminals.
 """
@@ -355,7 +355,7 @@ class Refused(PageTest):
         self.assertEqual(page.run("fingertip.fingertips.length"), 0)
 
 
-class Looks(PageTest):
+class Appearance(PageTest):
     """Against pictures that somebody has looked at, of the same moment of a recording."""
 
     LIMIT = 11  # of what one place in a hundred exceeds: other fonts 4 (with serifs) to 10.5 (of one width), no traces 24 in their part, no colours 45, no pad 57

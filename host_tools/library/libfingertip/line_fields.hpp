@@ -26,10 +26,10 @@ struct Quantity {
 
 inline constexpr std::size_t RAW_COLUMNS = 6; /* without those of the sensors */
 
-/* Sets of columns that came later, one after the other; a recording has so many of them. */
+/* Sets of columns that came later, one after the other; a recording has the first N of them. */
 inline constexpr int LATER_SETS = 2;
 
-/* Flags of columns that one with so many of these sets has not. */
+/* Flags of columns that a recording with N of these sets lacks. */
 inline constexpr std::uint32_t flags_beyond(int sets) {
   std::uint32_t flags = 0;
   flags |= sets > 0 ? 0u : static_cast<std::uint32_t>(CONTACT_FLAG_TANGENTIAL_VALID | CONTACT_FLAG_VELOCITY_VALID);

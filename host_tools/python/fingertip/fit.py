@@ -481,8 +481,8 @@ def main(argv: list[str]) -> int:
     parser.add_argument("-o", "--output", metavar="FILE", help="default: standard output")
     parser.add_argument("--overwrite", action="store_true", help="replace it if it exists")
     options = parser.parse_args(argv)
-    say = reporter(parser.prog)
-    warnings.showwarning = lambda message, *_: say(f"warning: {message}")
+    warn = reporter(parser.prog)
+    warnings.showwarning = lambda message, *_: warn(f"warning: {message}")
     if options.output and os.path.exists(options.output) and not options.overwrite:
         raise InputError(f"{options.output}: exists already; give --overwrite to replace it")
     pressures, time_s = read_table(options.file, len(read_pad(options.pad).x_mm), options.first, options.time)

@@ -94,7 +94,7 @@ static std::map<std::int64_t, twin::Scenario> &scenarios() {
   return all;
 }
 
-// facts: the number of the new scenario, how many acts it has, and how many phases.
+// facts: the number of the new scenario, the counts of its `act` and of its phases.
 static void scenario_begin(Batch<const scenario_options, 1> options, std::string cache, Batch<std::int64_t, 1> facts) {
   const scenario_options &given = options[0];
   twin::ScenarioOptions chosen;

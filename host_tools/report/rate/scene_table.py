@@ -87,7 +87,7 @@ def rows_in(text):
 
 
 def differences(found, expected):
-    """Lines that say where the words or figures of two tables differ."""
+    """Lines that report where the words or figures of two tables differ."""
     if [row[0] for row in found] != [row[0] for row in expected]:
         return ["other scenes"]
     lines = []

@@ -25,7 +25,7 @@ WORDS = {
     "SYNC": "sync pin",
 }
 STREAM = dict.fromkeys(SCENES, "contact") | {"raw": "raw"}
-# The contact of the scenario "wander" stands from 0.65 s on; windows of whole temperature intervals.
+# The contact of the scenario "wander" lasts from 0.65 s on; windows of whole temperature intervals.
 REST_s = (0.5, 0.58)
 CONTACT_FROM_s, WINDOW_s, SETTLE_s = 1.0, 1.0, 0.1
 

@@ -1,4 +1,4 @@
-"""Scenarios of the twin, and fingertip_player, which plays them through the firmware's own code."""
+"""Scenarios of the twin, and fingertip_player, which runs them through the firmware's own code."""
 
 import subprocess
 

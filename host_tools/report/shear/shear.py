@@ -28,7 +28,7 @@ PARTS = {
     "static": "one touch: size, direction, location and force by pad, tangential force, object and location; pads that end",
     "motion": "objects that are lifted, carried and slip: sliding distinguished from loading",
 }
-# Of contacts after contacts, which the part over_time of truth.py plays: here, there, and its goal.
+# Of contacts after contacts, which the part over_time of truth.py simulates: here, there, and its goal.
 OVER_TIME = (
     ("valid_percent", "remembered_valid_percent", ">=", 95),
     ("phantom_p95", "remembered_vector_error_p95", "<=", 0.07),

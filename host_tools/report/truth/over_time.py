@@ -1,12 +1,12 @@
 """Contacts after contacts, on pads that remember, lean, end, or are thin: each is calibrated with a weight, as a user does it, and then pressed
 every few seconds.
 
-The scenarios are the twin's, and the firmware's own code plays them whole: zero, gate, fit, tangential estimate, doubt. Judged are touches that
+The scenarios are the twin's, and the firmware's own code processes them whole: zero, gate, fit, tangential estimate, doubt. Judged are touches that
 have HISTORY before them, each at FRAMES moments, evenly spread over those at which the force has not changed by more than a twentieth within
 0.15 s. So a hold of 10 s counts as much as one of 0.2 s.
 
 The constants of firmware/condition and firmware/fit that these pads judge were chosen on pads 1 to 4, 11 to 16, 21 to 24 and 31 to 34, and
-looked at on 7000 to 7005 and 8000 to 8002; others judge here.
+examined on 7000 to 7005 and 8000 to 8002; others judge here.
 """
 
 import math

@@ -1,19 +1,19 @@
 // What rubber and sensors do to the pressure on the base before a sensor reports it. Each effect is
 // switched on by its name and has one value; effects() is the list of them, with sources.
 //
-// README.md says what each does, in the order in which they act on the pressure p of one sensor, V its value. Formulas:
+// README.md describes each, in the order in which they act on the pressure p of one sensor, V its value. Formulas:
 //   dip          from p goes V of the pressure in the contact's middle times exp(-r^2 / (2 (2.5 s)^2)), s its width
 //   hysteresis   rate-independent. Loading to a new maximum m, p stays; unloading from m it is lower by
 //                3 V p (1 - p / m): the loop is V of the area below the loading curve. Loading again leads straight
 //                back to m. Nothing remains at p = 0.
 //   memory       less m z: z follows p with the sensor's own time constant of 1 to 4 s. m is drawn, of either sign,
-//                so that a hold of 8 s changes by V (sd), for one sensor of eight by 4.6 V. What a hold took off stands
+//                so that a hold of 8 s changes by V (sd), for one sensor of eight by 4.6 V. What a hold took off remains
 //                off after it.
 //   aftereffect  plus a share of the peak that each sensor remembers and p has left: a (m - p). m is p while p rises
 //                above it, and otherwise returns to p with its time constant. a is 0.5 to 1.25 V, for one sensor of
 //                three -0.75 to -2.25 V.
 //   creep        plus V of what follows p with the time constant CREEP_s
-//   relaxation   acts on the force, not on a sensor: relaxed_share().
+//   relaxation   changes the force, not on a sensor: relaxed_share().
 //   temperature  by V with the slowest time constant 4 h^2 / (pi^2 a) of a layer h warmed from above
 #pragma once
 

@@ -4,7 +4,7 @@
 // Nothing touches the pad for the first START_QUIET_s, nor for quiet_s after each contact: time for the 16 frames of
 // the firmware's tare at 20 frames a second; the paper, too, sets its readings to zero between contacts.
 //
-// README.md says where things are, what the truth calls slip, what a tangential force is of, and what is left out.
+// README.md describes where things are, what the truth calls slip, what a tangential force is of, and what is left out.
 #pragma once
 
 #include "library/pad/block.hpp"

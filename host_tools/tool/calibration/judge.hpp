@@ -4,7 +4,7 @@
  * PLACEMENTS_ENOUGH to HELPS_SHARE of how much they differ, and if the gains from half of the placements make the firmware's fit of the
  * other half better. Where placements all over the pad do not determine every gain, and more would not either, but what one half found
  * brings the other's forces nearer to each other, the part that helps is kept: the gains, with readings as uncertain as without them, or
- * width and dip alone. It is good then, and reason says what is not known. Refused: what speaks against it does not go away with more
+ * width and dip alone. It is good then, and reason states what is not known. Refused: what speaks against it does not go away with more
  * placements. More: neither yet.
  *
  * The bounds on evidence lie between what good and bad sessions show: simulated pads of 12 mm, alike and as uneven as

@@ -85,7 +85,7 @@ struct Assumptions {
   double ellipse = 0.007;               /* of q1 and q2 from placement to placement; axes differ by 2 q */
   double ellipse_of_all = 0.03;         /* of their means: a foot is a foot, but its shape is not known */
   double pull = 0.1;                    /* of t1 and t2: the tangent of the slope */
-  double memory = 0.03;                 /* of r: of a press 1 to 9 % stand off after it, either sign */
+  double memory = 0.03;                 /* of r: of a press 1 to 9 % remain after it, either sign */
   double own_width = 0.01;              /* of b: 0.035 to 0.07 on real pads, which a session shows */
   double model_share = 0.002;           /* of the peak: what the profile leaves (above, and 0.13 % rms) */
   double reading_share = 0.003;         /* of a reading: what rubber does between 0.5 and 1 s */

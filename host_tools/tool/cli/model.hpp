@@ -18,7 +18,7 @@ namespace fingertip {
 /* A longer time without a frame is shown as a stall. */
 inline constexpr double STALLED_s = 0.7;
 
-/* Whether a warning says that its numbers deserve less trust. */
+/* Whether a warning means that its numbers deserve less trust. */
 inline bool is_doubtful(const wire_contact &contact) { return (contact.flags & warning_flags()) != 0; }
 
 /* Samples of the last intervals of a time, for traces. */

@@ -13,7 +13,7 @@ namespace fingertip {
 /* Where a location of the pad is in a picture: in square pixels, two to a character cell. */
 class PadScale {
 public:
-  /* Of so many sensors, in at most so many cells. */
+  /* Of N sensors, in at most the given number of cells. */
   template <typename Number> PadScale(const Number *x_mm, const Number *y_mm, std::size_t sensors, int columns, int rows) {
     constexpr float rim_mm = 5;        /* beyond the outer sensors: half a pitch of 9 mm and some */
     constexpr float finest_mm = 0.75f; /* sensors 9 mm apart measure nothing that is finer */

@@ -30,7 +30,7 @@ export class RealTime {
     this.kept = null;
     this.unsent = new Uint8Array(0);
     this.isOpen = false;
-    this.lasting = new Map(); // acts that outlast a restart
+    this.lasting = new Map(); // commands that outlast a restart
   }
 
   async plugIn() {

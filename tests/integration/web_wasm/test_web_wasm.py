@@ -42,7 +42,7 @@ class WebWasm(unittest.TestCase):
 
     def captured(self, scenario, *options):
         capture, player = self.folder / "felt.ftr", self.build / "host_tools/simulation/player/fingertip_player"
-        output = ("-o", self.folder / "felt.csv", "--raw-bytes", capture, "--overwrite", "--quiet")
+        output = ("-o", self.folder / "measured.csv", "--raw-bytes", capture, "--overwrite", "--quiet")
         must(player, "play", scenario, *output, "--raw", *options)
         return capture
 

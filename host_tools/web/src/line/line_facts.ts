@@ -524,7 +524,7 @@ export const SETTINGS = [
     command: PacketType.CMD_RATE,
     capability: 0,
     values: [
-      { field: 'rate_mHz', info: 'rate_mHz', say: 'Frame rate', per: 1000, whole: true, span: [0.1, 2000], choices: null, words: null, unlessGiven: null },
+      { field: 'rate_mHz', info: 'rate_mHz', title: 'Frame rate', per: 1000, whole: true, span: [0.1, 2000], choices: null, words: null, unlessGiven: null },
     ],
   },
   {
@@ -535,7 +535,7 @@ export const SETTINGS = [
     command: PacketType.CMD_OSR,
     capability: 0,
     values: [
-      { field: 'osr', info: 'osr', say: 'Oversampling', per: 1, whole: true, span: null, choices: [256, 512, 1024, 2048, 4096, 8192], words: null, unlessGiven: null },
+      { field: 'osr', info: 'osr', title: 'Oversampling', per: 1, whole: true, span: null, choices: [256, 512, 1024, 2048, 4096, 8192], words: null, unlessGiven: null },
     ],
   },
   {
@@ -546,7 +546,7 @@ export const SETTINGS = [
     command: PacketType.CMD_SLIP,
     capability: Capability.SLIP,
     values: [
-      { field: 'threshold_mm', info: 'slip_threshold_mm', say: 'Slip threshold', per: 1, whole: false, span: [0.01, 50], choices: null, words: null, unlessGiven: null },
+      { field: 'threshold_mm', info: 'slip_threshold_mm', title: 'Slip threshold', per: 1, whole: false, span: [0.01, 50], choices: null, words: null, unlessGiven: null },
     ],
   },
   {
@@ -557,7 +557,7 @@ export const SETTINGS = [
     command: PacketType.CMD_SLIP,
     capability: Capability.SLIP,
     values: [
-      { field: 'window_ms', info: 'slip_window_ms', say: 'Slip window', per: 1, whole: true, span: [5, 1000], choices: null, words: null, unlessGiven: null },
+      { field: 'window_ms', info: 'slip_window_ms', title: 'Slip window', per: 1, whole: true, span: [5, 1000], choices: null, words: null, unlessGiven: null },
     ],
   },
   {
@@ -568,8 +568,8 @@ export const SETTINGS = [
     command: PacketType.CMD_PRIOR,
     capability: Capability.FIT,
     values: [
-      { field: 'sigma_mm', info: 'prior_sigma_mm', say: 'Prior', per: 1, whole: false, span: [0.5, 100], choices: null, words: null, unlessGiven: null },
-      { field: 'width_mm', info: 'prior_width_mm', say: "The prior's width", per: 1, whole: false, span: [0.01, 100], choices: null, words: null, unlessGiven: 0.5 },
+      { field: 'sigma_mm', info: 'prior_sigma_mm', title: 'Prior', per: 1, whole: false, span: [0.5, 100], choices: null, words: null, unlessGiven: null },
+      { field: 'width_mm', info: 'prior_width_mm', title: "The prior's width", per: 1, whole: false, span: [0.01, 100], choices: null, words: null, unlessGiven: 0.5 },
     ],
   },
   {
@@ -580,7 +580,7 @@ export const SETTINGS = [
     command: PacketType.CMD_LOCATION_LIMIT,
     capability: Capability.FIT,
     values: [
-      { field: 'limit_mm', info: 'location_limit_mm', say: 'Location limit', per: 1, whole: false, span: [0.01, 100], choices: null, words: null, unlessGiven: null },
+      { field: 'limit_mm', info: 'location_limit_mm', title: 'Location limit', per: 1, whole: false, span: [0.01, 100], choices: null, words: null, unlessGiven: null },
     ],
   },
   {
@@ -591,7 +591,7 @@ export const SETTINGS = [
     command: PacketType.CMD_SYNC,
     capability: Capability.SYNC,
     values: [
-      { field: 'mode', info: 'sync', say: 'Sync pin', per: 1, whole: true, span: null, choices: [1, 2, 3], words: ['in', 'frame', 'second'], unlessGiven: null },
+      { field: 'mode', info: 'sync', title: 'Sync pin', per: 1, whole: true, span: null, choices: [1, 2, 3], words: ['in', 'frame', 'second'], unlessGiven: null },
     ],
   },
 ] as const;

@@ -33,7 +33,7 @@ function numberIn(value: Value, text: string): number {
   if (value.words) {
     const at = (value.words as readonly string[]).indexOf(text);
     if (at < 0) {
-      throw new Error(`${value.say}: "${text}" is none of ${value.words.join(', ')}`);
+      throw new Error(`${value.title}: "${text}" is none of ${value.words.join(', ')}`);
     }
     return value.choices[at]!;
   }
@@ -41,10 +41,10 @@ function numberIn(value: Value, text: string): number {
   const number = isNumber ? Number(text) : NaN;
   if (value.choices) {
     if (!value.choices.some((each) => each === number)) {
-      throw new Error(`${value.say}: "${text}" is none of ${value.choices.join(', ')}`);
+      throw new Error(`${value.title}: "${text}" is none of ${value.choices.join(', ')}`);
     }
   } else if (!(number >= value.span[0] && number <= value.span[1])) {
-    throw new Error(`${value.say}: "${text}" is not a number from ${value.span[0]} to ${value.span[1]}`);
+    throw new Error(`${value.title}: "${text}" is not a number from ${value.span[0]} to ${value.span[1]}`);
   }
   return value.whole ? Math.round(number * value.per) : number;
 }
