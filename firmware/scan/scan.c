@@ -114,6 +114,7 @@ static void end_bring_up(struct scan *scan) {
   set(&scan->temperature_within_us, 0); /* the next conversion is one */
   scan->void_next = 0;
   scan->was_zero = 0;
+  scan->zero_seen = 0;
   scan->missed_once = 0;
   scan->missed_twice = 0;
   convert(scan, true, false);
@@ -212,6 +213,7 @@ static sensor_map take_codes(struct scan *scan, const struct scan_conversion *co
 static __attribute__((noinline)) void take_reading(struct scan *scan, const struct scan_conversion *conversion) {
   struct scan_slot *slot = slot_for(scan, conversion);
   sensor_map good = take_codes(scan, conversion, slot ? slot->code : NULL);
+  scan->zero_seen |= scan->was_zero;
   if (conversion->is_frame) {
     count(&scan->counters.frames, 1);
     if (good != first_sensors(scan->sensor_count)) {
@@ -238,7 +240,8 @@ static __attribute__((noinline)) void take_reading(struct scan *scan, const stru
     scan->returned = 0;
   } else {
     slot->still = scan->still[0];
-    slot->zero = scan->was_zero;
+    slot->zero = (scan_read(&scan->slot_state) == SCAN_SLOT_FULL ? slot->zero : 0) | scan->zero_seen;
+    scan->zero_seen = 0;
   }
   hand_over(conversion->is_temperature ? &scan->temperature_state : &scan->slot_state, SCAN_SLOT_FULL);
 }

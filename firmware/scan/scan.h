@@ -106,7 +106,7 @@ struct scan_slot {
   struct scan_conversion conversion;
   sensor_map good;               /* bitmap: the code is a measurement */
   sensor_map still;              /* bitmap: and that of the one before. Of a frame */
-  sensor_map zero;               /* bitmap: the code was 0. Of a frame */
+  sensor_map zero;               /* bitmap: has read 0 since the last one that was taken. Of a frame */
   sensor_map prom_changed;       /* bitmap: another sensor than before. Of a temperature */
   sensor_map returned;           /* bitmap: admitted again, perhaps after long. Of a temperature */
   uint32_t code[FT_MAX_SENSORS]; /* [sensor] 24-bit */
@@ -148,6 +148,7 @@ struct scan {
   uint32_t frame_number;
   sensor_map void_next;         /* bitmap: the next reading does not count */
   sensor_map was_zero;          /* bitmap: the last reading was 0 */
+  sensor_map zero_seen;         /* bitmap: one was since the slot of the frame was filled */
   sensor_map still[SCAN_STILL]; /* [n] bitmap: the same code as in the n + 1 frames before */
   sensor_map missed_once;       /* bitmap: the last reading was not acknowledged, ... */
   sensor_map missed_twice;      /* ... nor the one before */

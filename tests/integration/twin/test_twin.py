@@ -298,13 +298,8 @@ class Usage(TwinTest):
         ):
             self.assertIn("; ", self.scenario_error(*words.split()), words)
         self.assertIn("/no/such/place.csv: No such file or directory", self.error("scenario", "taps", "-o", "/no/such/place.csv"))
-        for words in (
-            "scenario",
-            "scenario taps",
-            "draw",
-            "",
-            *(f"scenario taps -o x.csv {w}" for w in ("--seed -1", "--pad 1.5", "--seconds x")),
-        ):
+        taps = map("scenario taps -o x.csv {}".format, ("--seed -1", "--pad 1.5", "--seconds x"))
+        for words in ("scenario", "scenario taps", "draw", "", *taps):
             self.error(*words.split(), status=2)
 
     def test_a_cache_that_cannot_be_is_told(self):

@@ -24,6 +24,17 @@ TEST(test_zeros_and_ones_void_the_next_reading_too) {
   }
 }
 
+/* The frame that has the zero gives way to the next one. */
+TEST(test_a_zero_in_a_frame_that_was_not_taken_asks_for_a_temperature) {
+  skip_frames(5);
+  taking = false;
+  fake.zero_next = DISTURBED_BIT;
+  run_until(now_us + 11000);
+  taking = true;
+  skip_frames(3); /* the last one, the one that runs, and the temperature */
+  TEST_ASSERT_TRUE(frame.held);
+}
+
 /* Some have lost a conversion, or have had the same code six times. */
 TEST(test_sensors_that_read_zero_or_never_change_are_reset_at_once) {
   for (int i = 0; i < 4; i++) {
