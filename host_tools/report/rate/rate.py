@@ -6,6 +6,7 @@
     rate.json    the figures by which the rate is judged, with their goals; all tables of rate.md
     rate.md      the same to read
     rate.png     the same to look at
+    scenes.png   what each scene computes, leaves out, and takes
 
 text.md.in describes what is measured.
 """
@@ -21,7 +22,7 @@ import grasp_rate  # noqa: E402
 import rate_report  # noqa: E402
 import scenes  # noqa: E402
 from boards import BOARDS, PARALLEL, short  # noqa: E402
-from emulated import CLOCK_Hz, CONVERSION_us, FROM_s, Measurement, distribution, scenario  # noqa: E402
+from emulated import CONVERSION_us, FROM_s, Measurement, distribution, scenario  # noqa: E402
 from fingertip.files import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
 from reporting import Steps, option_parser, output_folder, publish  # noqa: E402
@@ -139,7 +140,8 @@ def main(argv):
         of_grasp = grasp_rate.figures(grasp)
     found = judge(figures(runs, resting, rows) | of_grasp, GOALS)
     found |= {"by_osr": by_osr(runs), "scenes": rows}
-    return publish(found, options, "rate", {"rate.png": lambda path: rate_report.draw(path, found, runs[PARALLEL, 256])})
+    pictures = {"rate.png": lambda path: rate_report.draw(path, found, runs[PARALLEL, 256])}
+    return publish(found, options, "rate", pictures | {"scenes.png": lambda path: rate_report.draw_scenes(path, rows)})
 
 
 if __name__ == "__main__":

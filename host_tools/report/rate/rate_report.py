@@ -1,11 +1,13 @@
 """rate.json as a picture."""
 
 import itertools
+import textwrap
 
 import matplotlib
 from boards import BOARDS, PARALLEL
 from presentation import BLUE, FAINT, GOAL, ORANGE, plt, save
 from emulated import CONVERSION_us
+from scenes import WORDS, capabilities
 
 COLOURS = dict(zip(BOARDS, itertools.cycle((BLUE, ORANGE, GOAL, FAINT))))
 
@@ -19,6 +21,27 @@ def draw(path, found, parallel):
         axes.grid()
         axes.legend(fontsize=8)
     figure.tight_layout()
+    save(figure, path)
+
+
+def draw_scenes(path, rows):
+    """What each scene computes and leaves out on the parallel board, with its bytes and cycles."""
+    rows, on = [row for row in rows if row["board"] == PARALLEL], capabilities()
+    names = ("flash_bytes", "ram_bytes", "stack_bytes", "cycles_of_frame")
+    headings = [textwrap.fill(name.replace("_", " "), 13) for name in (*WORDS.values(), *names)]
+    cells = [["" for _ in WORDS] + [f"{row[name]:.0f}" for name in names] for row in rows]
+    colours = [[BLUE if name in on[row["scene"]] else "white" for name in (*WORDS, *names)] for row in rows]
+    figure, axes = plt.subplots(figsize=(13, 1.6 + 0.35 * len(rows)), layout="constrained")
+    table = axes.table(
+        cells, colours, rowLabels=[row["scene"] for row in rows], colLabels=headings, cellLoc="center", bbox=(0.05, 0, 0.95, 1)
+    )
+    table.auto_set_font_size(False)
+    for (down, _), cell in table.get_celld().items():
+        cell.set(height=4 if down == 0 else 1, edgecolor=FAINT, fontsize=8.5)
+    axes.set_axis_off()
+    axes.set_title(
+        f"What each scene computes (blue), leaves out (white) and takes: {PARALLEL}, OSR 256, in contact", loc="left", weight="bold"
+    )
     save(figure, path)
 
 

@@ -82,7 +82,7 @@ class Rate(report_case.ReportCase):
         self.assertGreater(slip["cycles_by_stage"]["fit"], 15000)
 
     def test_text_and_picture(self):
-        self.assertEqual((self.folder / "rate.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual({(self.folder / name).read_bytes()[:8] for name in ("rate.png", "scenes.png")}, {b"\x89PNG\r\n\x1a\n"})
         text = (self.folder / "rate.md").read_text()
         for name, *_ in rate.GOALS:
             self.assertRegex(text, rf"\| {name} \| [0-9.]+ \| [<>]= [0-9]+ \| (met|MISSED) \|")
