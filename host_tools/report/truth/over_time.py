@@ -3,7 +3,7 @@ every few seconds.
 
 The scenarios are the twin's, and the firmware's own code processes them whole: zero, gate, fit, tangential estimate, doubt. Judged are touches that
 have HISTORY before them, each at FRAMES moments, evenly spread over those at which the force has not changed by more than a twentieth within
-0.15 s. So a hold of 10 s counts as much as one of 0.2 s.
+0.15 s. So a hold of 10 s counts as much as one of 0.2 s. A slide moves on meanwhile.
 
 The constants of firmware/condition and firmware/fit that these pads judge were chosen on pads 1 to 4, 11 to 16, 21 to 24 and 31 to 34, and
 examined on 7000 to 7005 and 8000 to 8002; others judge here.
@@ -53,6 +53,7 @@ class Kind(NamedTuple):
     pull: float = 0
     margin_mm: float = 4.5  # beyond the published grid: to the outer sensors
     beyond_mm: float = -HALF_mm[1]  # only touches so far beyond the outer sensors
+    scenario: str = "hold"
 
 
 REMEMBERING, STRIPS, ENDING = Pads(USUAL), Pads(STRIP), Pads(USUAL, options=("--overhang", 9))
@@ -63,6 +64,7 @@ KINDS = (
     Kind("remembered", REMEMBERING, "remembered"),
     Kind("remembered, lime", REMEMBERING, object="lime"),
     Kind("remembered, pulled", REMEMBERING, "pulled", pull=PULL),
+    Kind("remembered, a lime that slides", REMEMBERING, "slides", object="lime", scenario="slip"),
     Kind("as strips", STRIPS),
     Kind("as strips, pulled", STRIPS, pull=PULL),
     Kind("ends of 9 mm", ENDING, "ends"),
@@ -123,7 +125,7 @@ def pressed(player, kind, seed, commands):
         first.write_bytes(commands)
         pull = ("--tangential", kind.pull) if kind.pull else ()
         touch = ("--indenter", kind.object, "--force", FORCES_N, "--margin", kind.margin_mm, *pull)
-        player.write(path, "hold", kind.pads.effects, seed, PRESSES_s, "--layer", kind.pads.layer_mm, *kind.pads.options, *touch)
+        player.write(path, kind.scenario, kind.pads.effects, seed, PRESSES_s, "--layer", kind.pads.layer_mm, *kind.pads.options, *touch)
         thin = ("--prior-sigma", THIN_SIGMA_mm, "--prior-width", THIN_SD_mm)
         of_pad = ("--pad", kind.pads.layer_mm, "--first", first) if kind.pads.calibrated else thin
         player.play(path, recording, seed, "--osr", 256, *of_pad)

@@ -63,6 +63,7 @@ GOALS = (
     ("remembered_trusted_percent", ">=", 90),
     ("remembered_force_p50_percent", "<=", 2),
     ("remembered_refused", "<=", 0),
+    ("slides_vector_error_p95", "<=", 0.07),
     *((f"{kind}_cover_1sd_percent", "within", (55, 80)) for kind in OVER_TIME),
     ("over_time_silent_percent_worst", "<=", 0.5),
     ("slow_force_error_percent", "<=", 2),
