@@ -77,7 +77,7 @@ struct condition_sensor {
   int32_t reached_Pa_q10; /* the same of this contact alone */
   int32_t past_Pa_q10;    /* what rubber may keep: rises in a hold, and by all that is let go; fades in 3 s */
   int32_t past_share;     /* sd of that, 1 / 2^16: learnt from what is left after contacts */
-  int32_t keeps_share;    /* mean, of either sign, learnt likewise */
+  int32_t keeps_share;    /* mean, of either sign, learnt as that is */
   int32_t let_go_Pa_q10;  /* suddenly in this contact, fading: as where it slides on */
   int32_t kept_Pa_q10;    /* of that */
   int32_t wander_Pa_q10;

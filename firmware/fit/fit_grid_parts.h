@@ -31,7 +31,7 @@ static inline void fit_use_rectangle(const struct fit_grid_shape *grid) {
 #endif
 #define NODES (COLUMNS * ROWS)
 #define MOST_NODES FIT_GRID_MOST_NODES
-/* So many bits less have the two sums whose quotient is the amplitude, so that they stay within 32 bits. */
+/* The two sums whose quotient is the amplitude have this many bits less, to stay within 32. */
 #define PRODUCT_SHIFT (NODES > 31 ? 1 : 0)
 #define ONE_Q26 (1 << 26)
 #define NOINLINE __attribute__((noinline))

@@ -5,7 +5,7 @@ import numpy.typing as npt
 
 _FRONT = b"0" * 16  # so that there are two words before the first cell
 _ZEROS, _TOPS, _OVER_9 = (np.uint64(0x0101010101010101 * byte) for byte in (ord("0"), 0x80, 0x76))
-_LAST = np.array([2**64 - 2 ** (64 - 8 * count) if count else 0 for count in range(9)], np.uint64)  # so many bytes of a word
+_LAST = np.array([2**64 - 2 ** (64 - 8 * count) if count else 0 for count in range(9)], np.uint64)  # a word's first bytes, by how many
 _STEPS = [tuple(map(np.uint64, step)) for step in ((8, 10, 0x00FF00FF00FF00FF), (16, 100, 0x0000FFFF0000FFFF), (32, 10000, 0xFFFFFFFF))]
 _DIGITS_MOST = 15  # exact in a double
 _TENS = np.array([10**digits for digits in range(_DIGITS_MOST + 1)], np.uint64)
@@ -14,7 +14,7 @@ _TENS = np.array([10**digits for digits in range(_DIGITS_MOST + 1)], np.uint64)
 def _numbers(
     aligned: npt.NDArray[np.uint64], ends: npt.NDArray[np.int64], lengths: npt.NDArray[np.int64]
 ) -> tuple[npt.NDArray[np.uint64], ...]:
-    """Of so many digits before each end, eight at most; and not 0 where something else is among them."""
+    """Of the digits before each end, as many as this, eight at most; and not 0 where something else is among them."""
     at, bits = (ends >> 3) - 1, (ends & 7) << 3
     digits = aligned.take(at) >> bits.view(np.uint64)
     digits |= aligned[1:].take(at) << (64 - bits).view(np.uint64)
@@ -32,7 +32,7 @@ def _numbers(
 
 
 def cells_of(text: bytes, columns: int, is_whole: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]] | None:
-    """[row, cell], NaN where one is empty, of lines with so many cells each; None where one has others. And the rows with cells, NaN too, that hold
+    """[row, cell], NaN where one is empty, of lines with this many cells each; None where one has others. And the rows with cells, NaN too, that hold
     something else than a number of 15 digits at most, or than digits alone where the column is_whole."""
     padded = b"".join((_FRONT, text, bytes(16 - len(text) % 8)))
     letters, aligned = np.frombuffer(padded, np.uint8), np.frombuffer(padded, "<u8")

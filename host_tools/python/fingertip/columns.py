@@ -11,7 +11,7 @@ from .frames import Q10
 Array = npt.NDArray[np.float64]
 _BLOCK_rows = 4096
 _NARROW = 2.0**32 - 1  # a wider span of whole numbers is kept as doubles
-_SENT = {"h": (100.0, 2), "i": (Q10, 4)}  # by struct's codes: as parts of the unit, which text has with so many decimals
+_SENT = {"h": (100.0, 2), "i": (Q10, 4)}  # by struct's codes: as parts of the unit, and the decimals in text
 
 
 def shortest(values: npt.NDArray[np.float32]) -> Array:
