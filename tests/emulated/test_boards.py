@@ -27,7 +27,7 @@ NOISE_Pa = {256: 11.0, 1024: 3.9}
 # Two standard deviations at the limit of UNCERTAIN: a location without a warning is not off by more, whatever befalls the array.
 UNWARNED_mm = 1.2
 HEALTH = "health"
-MOVING = 0.12  # of the frames are doubtful at most as pressures have moved since the last temperature: 4 to 8 % here, and a half more
+MOVING = 0.2  # of the frames are doubtful at most as pressures have moved since the last temperature: 4 to 8 % here, 17 % in a half second
 
 
 class BoardRun(Run):
