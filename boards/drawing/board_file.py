@@ -24,9 +24,8 @@ def zone(net, layers, fill, rectangle):
     left, top, right, bottom = rectangle
     corners = "".join(f" (xy {at(x, y)})" for x, y in ((left, top), (right, top), (right, bottom), (left, bottom)))
     on = " ".join(f'"{side}.Cu"' for side in layers)
-    return (
-        f"  (zone {net} (layers {on}) (hatch edge 0.5) (connect_pads (clearance 0.2)) (min_thickness 0.25) {fill} (polygon (pts{corners})))"
-    )
+    kind = f"{net} (layers {on}) (hatch edge 0.5) (connect_pads (clearance 0.2)) (min_thickness 0.25) {fill}"
+    return f"  (zone {kind} (polygon (pts{corners})))"
 
 
 def footprint(part, numbers):
@@ -54,14 +53,13 @@ def footprint(part, numbers):
 
 
 def copper(numbers, laid):
-    um = lambda x, y: at(x / 1000, y / 1000)
     sizes = f"(size {route.VIA_um / 1000}) (drill {route.DRILL_um / 1000})"
     for net, (tracks, vias) in laid.items():
         for x0, y0, x1, y1, layer in tracks:
-            ends = f"(start {um(x0, y0)}) (end {um(x1, y1)}) (width {route.TRACK_um / 1000})"
+            ends = f"(start {at(x0, y0)}) (end {at(x1, y1)}) (width {route.TRACK_um / 1000})"
             yield f'  (segment {ends} (layer "{"FB"[layer]}.Cu") (net {numbers[net]}))'
         for x, y in vias:
-            yield f'  (via (at {um(x, y)}) {sizes} (layers "F.Cu" "B.Cu") (net {numbers[net]}))'
+            yield f'  (via (at {at(x, y)}) {sizes} (layers "F.Cu" "B.Cu") (net {numbers[net]}))'
 
 
 def board_text(board):

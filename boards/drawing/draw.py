@@ -2,12 +2,12 @@
 """Draws all pictures and tables of the boards that follow from the boards' descriptors and the sensors' geometry.
 
 draw.py            writes them
-draw.py --lay      lays circuit boards: a minute for each boards/<board>/pcb, into the .kicad_pcb there; then run draw.py
+draw.py --lay      lays circuit boards: some minutes for each boards/<board>/pcb*, into the .kicad_pcb there; then run draw.py
 --check with either lists those that differ from what would be written
 
 boards/<board>/wiring.svg                  from board.json
 boards/<board>/README.md, wiring and parts from board.json and parts.json
-boards/<board>/pcb/, picture, BOM, plate   from the .kicad_pcb there and parts.json
+boards/<board>/pcb*/, picture, BOM, plate  from the .kicad_pcb there and parts.json
 boards/pads/<pad>.svg, <pad>.scad          template at 1:1 and solids of the printed parts, from <pad>.json there
 boards/BUILD.md, measures                  the same of the boards' own pad as a table
 """
@@ -63,9 +63,9 @@ def parts_table(board, parts):
 def laid(root):
     """{path: .kicad_pcb}"""
     found = {}
-    for path in sorted(root.glob("boards/*/pcb")):
-        name, descriptor = path.parent.name, json.loads(path.with_name("board.json").read_text(encoding="utf-8"))
-        found[path / f"fingertip-{name}.kicad_pcb"] = board_file.board_text(wiring.board_of(name, descriptor, root))
+    for path in sorted(root.glob("boards/*/pcb*/*.kicad_pro")):
+        board = wiring.board_of(path.stem.removeprefix("fingertip-"), geometry.descriptor(path.parent), root)
+        found[path.with_suffix(".kicad_pcb")] = board_file.board_text(board)
     return found
 
 
@@ -80,7 +80,7 @@ def drawings(root):
         page = path.parent / "README.md"
         text = filled(page.read_text(encoding="utf-8"), "wiring", wiring.table(board))
         found[page] = filled(text, "parts", parts_table(board, parts))
-    for path in sorted(boards.glob("*/pcb/*.kicad_pcb")):
+    for path in sorted(boards.glob("*/pcb*/*.kicad_pcb")):
         found |= pcb.files(path, parts, part_of)
     pads = {path: geometry.pad(path) for path in sorted(boards.glob("pads/*.json"))}
     for path, pad in pads.items():

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """What a board house wants of each circuit board, by KiCad's own plotter: Gerbers and drill files in one zip, list of parts, placement file, picture.
 
-fabricate.py FOLDER    writes FOLDER/<board>/ for each boards/<board>/pcb, and prints what KiCad's rule check finds: it shall be nothing
+fabricate.py FOLDER    writes FOLDER/<name>/ for each fingertip-<name>.kicad_pcb, and prints what KiCad's rule check finds: it shall be nothing
 
 Needs KiCad 6 (Debian: kicad, kicad-footprints). The same board gives the same bytes: dates and versions are left out.
 """
@@ -17,9 +17,7 @@ import zipfile
 import pcbnew
 
 LAYERS = ("F_Cu", "B_Cu", "F_Mask", "B_Mask", "F_Paste", "B_Paste", "F_SilkS", "B_SilkS", "Edge_Cuts")
-DATED = re.compile(
-    r"^(\*\* (Created|Drc)|G04 Created|%TF\.(Creation|Generation|ProjectId)|; DRILL|; #@! TF\.(Creation|Generation)).*\n", re.M
-)
+DATED = re.compile(r"^(\*\* (Created|Drc)|G04 Created|(%|; #@! )TF\.(Creation|Generation|ProjectId)|; DRILL).*\n", re.M)
 
 
 def judged(path, report):
@@ -53,11 +51,10 @@ def plotted(board, folder):
 
 def main(argv):
     if len(argv) != 1:
-        print(__doc__, file=sys.stderr)
-        return 2
+        sys.exit(__doc__)
     wrong = 0
-    for path in sorted(pathlib.Path(__file__).resolve().parents[1].glob("*/pcb/*.kicad_pcb")):
-        folder = pathlib.Path(argv[0]) / path.parents[1].name
+    for path in sorted(pathlib.Path(__file__).resolve().parents[1].glob("*/pcb*/*.kicad_pcb")):
+        folder = pathlib.Path(argv[0]) / path.stem.removeprefix("fingertip-")
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory() as scratch, zipfile.ZipFile(folder / f"{path.stem}-gerbers.zip", "w") as out:
             board, found = judged(path, folder / "rule-check.txt")

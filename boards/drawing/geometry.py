@@ -22,6 +22,15 @@ class Pad:
     overhang_mm: float
 
 
+def descriptor(folder):
+    """Of a circuit board: its board's, but for what a board.json in the folder itself has."""
+    paths = folder.with_name("board.json"), *folder.glob("board.json")
+    found, *own = (json.loads(path.read_text(encoding="utf-8")) for path in paths)
+    for other in own:
+        found |= other | {"wiring": found["wiring"] | other["wiring"]}
+    return found
+
+
 def pad(path):
     found = json.loads(path.read_text(encoding="utf-8"))
     places, columns, rows, pitch_mm = (found.get(key) for key in ("places_mm", "columns", "rows", "pitch_mm"))

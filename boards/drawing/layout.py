@@ -55,25 +55,24 @@ class Parts(list):
     def capacitor(self, x, y, turn, back=False):
         self.part("C", CAPACITOR, x, y, turn, back, {1: "3V3", 2: "GND"}, "100 nF")
 
-    def sensor(self, part, x, y, data, clock, pulls):
-        """pulls: {net: (side, ohms)}"""
-        self.part("U", SENSOR, x, y, 0, False, {1: "GND", 2: "3V3", 3: clock, 4: data}, part)
-        self.capacitor(x - BESIDE_mm, y + APART_mm, 270)
-        for net, (side, ohm) in pulls.items():
-            self.resistor(x + side * BESIDE_mm, y - APART_mm, 270, ohm, net)
+    def sensors(self, pad, clock, pulls):
+        """pulls: {net: (side, ohms)}; {} in a net is the sensor's number."""
+        for k, (x, y) in enumerate(pad.places):
+            self.part("U", SENSOR, x, -y, 0, False, {1: "GND", 2: "3V3", 3: clock.format(k), 4: f"SDA{k}"}, pad.part)
+            self.capacitor(x - BESIDE_mm, APART_mm - y, 270)
+            for net, (side, ohm) in pulls.items():
+                self.resistor(x + side * BESIDE_mm, -y - APART_mm, 270, ohm, net.format(k))
 
 
 def parallel(board, edge):
     """The Pico is on the back: no cable."""
     parts, ohm, side = Parts(), board.pull_ups_ohm, 1 if board.pad.pitch_mm > ROOMY_mm else -1
-    for k, (x, y) in enumerate(board.pad.places):
-        parts.sensor(board.pad.part, x, -y, f"SDA{k}", "SCL", {f"SDA{k}": (side, ohm["sda"])})
+    parts.sensors(board.pad, "SCL", {"SDA{}": (side, ohm["sda"])})
     parts.resistor(8, edge + PULLS_mm, 0, ohm["scl"], "SCL")
     nets = dict.fromkeys([*pico.grounds(), pico.pin("AGND")], "GND") | {pico.pin("3V3"): "3V3"}
-    nets |= {pico.pin(f"GP{k}"): f"SDA{k}" for k in range(board.sensors)} | {pico.pin(f"GP{board.wiring['pin_scl']}"): "SCL"}
-    if "pin_sync" in board.wiring:
-        nets[pico.pin(f"GP{board.wiring['pin_sync']}")] = "SYNC"
-        parts.part("J", POINT, -16, edge + PULLS_mm, 0, True, {1: "SYNC"}, "")
+    lines = [*(f"SDA{k}" for k in range(board.sensors)), "SCL", "SYNC"]
+    nets |= {pico.pin(f"GP{gpio}"): net for gpio, net in zip(wiring.gpios(board), lines)}
+    parts.part("J", POINT, -16, edge + PULLS_mm, 0, True, {1: "SYNC"}, "")
     parts.part("A", PICO, 0, edge + EDGE_mm, 180, True, nets, "Raspberry Pi Pico")
     return parts
 
@@ -83,11 +82,10 @@ def multiplexed(board, edge):
     parts, ohm = Parts(), board.pull_ups_ohm
     if board.strips > 3:
         raise wiring.Unwired(f"boards/{board.name}: {board.strips} strips; a circuit board has a place and a wire for three")
-    for k, (x, y) in enumerate(board.pad.places):
-        parts.sensor(board.pad.part, x, -y, f"SDA{k}", f"SCL{k}", {f"SDA{k}": (-1, ohm["channel"]), f"SCL{k}": (1, ohm["channel"])})
+    parts.sensors(board.pad, "SCL{}", {"SDA{}": (-1, ohm["channel"]), "SCL{}": (1, ohm["channel"])})
     right, down = (max(abs(place[axis]) for place in board.pad.places) + MULTIPLEXER_mm for axis in (0, 1))
     beside = [(-right, 0, 180, -1.3, -6), (0, down, 270, -6, 1.3), (right, 0, 0, 1.3, 6)]  # the last two: to its capacitor
-    for strip, (x, y, turn, dx, dy) in zip(range(board.strips), beside):
+    for strip, (x, y, turn, dx, dy) in zip(range(board.strips), beside if board.strips > 2 else beside[::2]):
         nets = {12: "GND", 24: "3V3", 22: "SCL", 23: "SDA", 3: f"RESET{strip}"} | dict(zip((21, 2, 1), wiring.levels(board, strip)))
         for k, (data, clock) in zip(board.sensors_of(strip), CHANNELS):
             nets |= {data: f"SDA{k}", clock: f"SCL{k}"}

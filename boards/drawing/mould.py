@@ -56,10 +56,8 @@ def table(pad):
     """Markdown."""
     m = measures(pad)
     size = lambda each, more=0: f"{each[0] + more:g} x {each[1] + more:g} mm"
-    (x, y), hollow = (
-        m.screws[-1],
-        f"face down, in a block of {size(m.flange, 2 * WALL_mm)}, {pad.thickness_mm + WALL_mm:g} mm high, open above",
-    )
+    x, y = m.screws[-1]
+    hollow = f"face down, in a block of {size(m.flange, 2 * WALL_mm)}, {pad.thickness_mm + WALL_mm:g} mm high, open above"
     rows = [
         ("base plate", f"{size(m.outside)}, {pad.high_mm:g} mm thick; a square hole of {m.hole_mm:g} mm for each sensor"),
         ("rubber that is touched", f"{size(m.skin)}, {pad.thickness_mm:g} mm thick: {pad.overhang_mm:g} mm beyond the outer sensors"),

@@ -1,7 +1,6 @@
 """What follows from a circuit board's KiCad file: its picture, the list of parts to order, and its base plate. For draw.py."""
 
-import json
-
+import geometry
 import pcb_check
 import sheet
 
@@ -10,23 +9,19 @@ HOLE_mm, PLAY_mm, POCKET_mm = 3.7, 0.3, 1.1
 
 
 def bom(board, listed, part_of):
-    found = {}
-    for name, (*_, value) in board.parts.items():
-        if value:
-            part = part_of(listed, value)
-            row = json.dumps([value, part["maker"], part["order"]], separators=(",", ":"))[1:-1]
-            found.setdefault(row, []).append(name)
-    return "\n".join(["Comment,Maker,Order number,Designator", *(f'{row},"{",".join(names)}"' for row, names in found.items())]) + "\n"
+    rows = ["Comment,Maker,Order number,Designator"]
+    for value in dict.fromkeys(value for *_, value in board.parts.values() if value):
+        part, names = part_of(listed, value), [name for name, (*_, other) in board.parts.items() if other == value]
+        rows.append(",".join(f'"{cell}"' for cell in (value, part["maker"], part["order"], ",".join(names))))
+    return "\n".join(rows) + "\n"
 
 
 def placements(board):
     """As many houses take it: places as in the Gerbers, parts turned counter-clockwise, seen from their side."""
     rows = ["Designator,Mid X,Mid Y,Layer,Rotation"]
     for name, (x, y, turn, back, value) in board.parts.items():
-        if value:
-            rows.append(
-                f"{name},{sheet.number(x)}mm,{sheet.number(-y)}mm,{'Bottom' if back else 'Top'},{(180 - turn if back else turn) % 360}"
-            )
+        side, turn = ("Bottom", 180 - turn) if back else ("Top", turn)
+        rows += [f"{name},{sheet.number(x)}mm,{sheet.number(-y)}mm,{side},{turn % 360}"] * bool(value)
     return "\n".join(rows) + "\n"
 
 
@@ -63,12 +58,11 @@ def drawn(board, name):
 
 def files(path, listed, part_of):
     """{path: text}. path: the .kicad_pcb."""
-    board = pcb_check.Board(path.read_text(encoding="utf-8"))
-    pad = json.loads((path.parents[1] / "board.json").read_text(encoding="utf-8"))["pad"]
+    board, name = pcb_check.Board(path.read_text(encoding="utf-8")), path.stem.removeprefix("fingertip-")
     texts = {
         "-bom.csv": bom(board, listed, part_of),
         "-placement.csv": placements(board),
-        "-plate.scad": plate(board, pad),
-        ".svg": drawn(board, path.parents[1].name),
+        "-plate.scad": plate(board, geometry.descriptor(path.parent)["pad"]),
+        ".svg": drawn(board, name),
     }
     return {path.with_name(path.stem + ending): text for ending, text in texts.items()}

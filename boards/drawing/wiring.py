@@ -68,12 +68,9 @@ def board_of(name, descriptor, root=geometry.ROOT):
 
 def gpios(board):
     w = board.wiring
-    own = (
-        list(range(board.sensors)) + [w["pin_scl"]]
-        if board.bus == "parallel"
-        else [w["pin_sda"], w["pin_scl"], *(board.reset_gpio(s) for s in range(board.strips))]
-    )
-    return own + ([w["pin_sync"]] if "pin_sync" in w else [])
+    if board.bus == "parallel":
+        return [*range(board.sensors), w["pin_scl"], w["pin_sync"]]
+    return [w["pin_sda"], w["pin_scl"], *(board.reset_gpio(s) for s in range(board.strips)), w["pin_sync"]]
 
 
 def listed(words):
@@ -115,9 +112,8 @@ def table(board):
         ]
         rows += [(gpio_cell([board.reset_gpio(s)]), f"RESET of the TCA9548A of strip {s}") for s in range(board.strips)]
         all_parts = "all parts"
-    if "pin_sync" in w:
-        rows.append((gpio_cell([w["pin_sync"]]), SYNC))
     rows += [
+        (gpio_cell([w["pin_sync"]]), SYNC),
         (f"3V3 OUT (pin {pico.pin('3V3')})", f"VDD of {all_parts} (sensors: pad {pads['VDD']}), pull-ups"),
         (f"GND (pins {listed(pico.grounds())})", f"GND of {all_parts} (sensors: pad {pads['GND']})"),
     ]
@@ -234,11 +230,10 @@ def drawn_parallel(board):
         text(pull_x + 28, 78, f"{ohms(ohm['sda'])} each", "small"),
         text(pull_x + 28, scl_y - 10, ohms(ohm["scl"]), "small"),
     ]
-    if "pin_sync" in board.wiring:
-        lines += gpio(sync_y, board.wiring["pin_sync"], right) + [
-            path("reset", f"M{right} {sync_y}H240"),
-            text(248, sync_y + 4, "sync, to a camera", "small"),
-        ]
+    lines += gpio(sync_y, board.wiring["pin_sync"], right) + [
+        path("reset", f"M{right} {sync_y}H240"),
+        text(248, sync_y + 4, "sync, to a camera", "small"),
+    ]
     for strip in range(board.strips):
         of = board.sensors_of(strip)
         lines += [
@@ -299,11 +294,10 @@ def drawn_multiplexed(board):
                 *sensor(at_sensor, y, k, board.pad.part),
             ]
     lines.append(text(34, sync_y + 40, f"each RESET also {ohms(ohm['reset'])} to 3V3", "small"))
-    if "pin_sync" in w:
-        lines += gpio(sync_y, w["pin_sync"], right, "sync") + [
-            path("reset", f"M{right} {sync_y}H200"),
-            text(206, sync_y + 4, "camera", "small"),
-        ]
+    lines += gpio(sync_y, w["pin_sync"], right, "sync") + [
+        path("reset", f"M{right} {sync_y}H200"),
+        text(206, sync_y + 4, "camera", "small"),
+    ]
     return picture(board, 760, max(tops[-1] + deep, sync_y + 100) + 20, lines + supply(34, sync_y + 60))
 
 
