@@ -75,6 +75,7 @@ PLANTS = {
         "a multiplexer without its capacitor": part("C16", lambda _: ""),
         "two wires of the connector exchanged": part("X0", exchanged("2", "3")),
     },
+    ("pico_mux_4x4", "text"): {"a wire of the connector open": part("X0", replaced(r'("7" .*) \(net .*\)\)', r"\1)"))},
     ("pico_parallel", "bom"): {
         "a smaller resistor": replaced("RC0603", "RC0402"),
         "a resistor of another value ordered": replaced("-073K3L", "-073K6L"),
