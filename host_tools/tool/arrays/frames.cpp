@@ -3,6 +3,7 @@
 #include "libfingertip/in_parallel.hpp"
 #include "library/pad/profile.hpp"
 #include "tool/arrays/fit_arguments.hpp"
+#include "tool/arrays/places.hpp"
 
 extern "C" {
 #include "common/pad_profile.h"
@@ -124,14 +125,7 @@ MEASURE_RECORD(fit_shapes_result, FIELD(shape), FIELD(x_mm), FIELD(y_mm), FIELD(
 // Of a pad over these sensors; overhang 0: not set.
 static void profile_of(Batch<const float, 1> x_mm, Batch<const float, 1> y_mm, double pitch_mm, double thickness_mm, double overhang_mm,
                        Batch<pad_profile, 1> profile) {
-  same_length(x_mm, y_mm);
-  require(x_mm.size() <= FT_MAX_SENSORS, "too many sensors");
-  wire_info places{};
-  places.sensor_count = static_cast<std::uint8_t>(x_mm.size());
-  places.pitch_mm = static_cast<float>(pitch_mm);
-  std::copy_n(x_mm.data, x_mm.size(), places.x_mm);
-  std::copy_n(y_mm.data, y_mm.size(), places.y_mm);
-  profile[0] = fingertip::pad::profile_of({thickness_mm, overhang_mm}, places);
+  profile[0] = fingertip::pad::profile_of({thickness_mm, overhang_mm}, places_of(x_mm, y_mm, pitch_mm));
 }
 MEASURE_ENTRY(profile_of)
 

@@ -25,60 +25,52 @@ Bundle::Bundle(double friction, double kinetic_share) : static_(friction), kinet
   }
 }
 
-Wrench Bundle::step(double seconds, double force_N, double stiffness_N_mm, double radius_mm, const Motion &motion) {
+void Bundle::step(double seconds, double force_N, double stiffness_N_mm, const Motion &motion) {
   const double holds_N = friction() * force_N;
-  const double lever_mm = LEVER * radius_mm;
-  const double turn_mm_s = lever_mm * motion.turn_rad_s;
   const double damping = stiffness_N_mm * HeldObject::LOSS_s;
-  double sum_x = 0.0, sum_y = 0.0, sum_t = 0.0, lost_mW = 0.0;
+  double sum_x = 0.0, sum_y = 0.0, lost_mW = 0.0;
   double slowest = std::numeric_limits<double>::infinity();
   bool slides = true;
   for (std::size_t i = 0; i < ELEMENTS; i++) {
     const double c = stiffness_share_[i] * damping;
     double x = x_N_[i] + c * motion.x_mm_s, y = y_N_[i] + c * motion.y_mm_s;
-    double t = t_N_[i] + c * turn_mm_s;
-    const double size_2 = x * x + y * y + t * t, limit = friction_share_[i] * holds_N;
-    double stretch_x = motion.x_mm_s, stretch_y = motion.y_mm_s, stretch_t = turn_mm_s;
+    const double size_2 = x * x + y * y, limit = friction_share_[i] * holds_N;
+    double stretch_x = motion.x_mm_s, stretch_y = motion.y_mm_s;
     if (size_2 > limit * limit) {
       // A slider takes what its spring, which the damper slows, does not.
       const double size = std::sqrt(size_2), per_c = 1.0 / c, share = limit / size;
       slowest = std::min(slowest, (size - limit) * per_c);
       x *= share;
       y *= share;
-      t *= share;
       stretch_x = (x - x_N_[i]) * per_c;
       stretch_y = (y - y_N_[i]) * per_c;
-      stretch_t = (t - t_N_[i]) * per_c;
     } else {
       slides = false;
     }
     sum_x += x;
     sum_y += y;
-    sum_t += t;
     // What the motion puts in and the springs do not get.
-    lost_mW += x * motion.x_mm_s + y * motion.y_mm_s + t * turn_mm_s - x_N_[i] * stretch_x - y_N_[i] * stretch_y - t_N_[i] * stretch_t;
+    lost_mW += x * motion.x_mm_s + y * motion.y_mm_s - x_N_[i] * stretch_x - y_N_[i] * stretch_y;
     const double k = stiffness_share_[i] * stiffness_N_mm * seconds;
     x_N_[i] += k * stretch_x;
     y_N_[i] += k * stretch_y;
-    t_N_[i] += TURN_STIFFNESS * k * stretch_t;
   }
   lost_mJ_ += lost_mW * seconds;
   // Elements that slide one against the other are no gross slip.
   constexpr double TOGETHER = 0.98;
-  const double size_2 = sum_x * sum_x + sum_y * sum_y + sum_t * sum_t;
+  const double size_2 = sum_x * sum_x + sum_y * sum_y;
   slips_ = slides && size_2 >= TOGETHER * TOGETHER * holds_N * holds_N;
   slip_mm_s_ = slips_ ? slowest : 0.0;
   rested_ += seconds * ((1.0 - rested_) / HeldObject::HEALS_s - rested_ * slip_mm_s_ / HeldObject::SETTLES_mm);
   rested_ = std::max(rested_, 0.0);
   pull_x_N_ = sum_x;
   pull_y_N_ = sum_y;
-  return {-sum_x, -sum_y, -sum_t * lever_mm};
 }
 
 double Bundle::elastic_mJ(double stiffness_N_mm) const {
   double sum = 0.0;
   for (std::size_t i = 0; i < ELEMENTS; i++) {
-    sum += (x_N_[i] * x_N_[i] + y_N_[i] * y_N_[i] + t_N_[i] * t_N_[i] / TURN_STIFFNESS) / (2.0 * stiffness_share_[i] * stiffness_N_mm);
+    sum += (x_N_[i] * x_N_[i] + y_N_[i] * y_N_[i]) / (2.0 * stiffness_share_[i] * stiffness_N_mm);
   }
   return sum;
 }

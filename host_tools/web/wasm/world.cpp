@@ -138,10 +138,10 @@ void World::move(double seconds) {
   }
   const double radius_mm = force_N_ > 0.0 ? twin::ForcePlanes::between_forces(object_->radius_mm, std::max(force_N_, LEAST_N)) : 0.0;
   const double touching_mm = std::max(radius_mm, 0.05);
-  const Wrench rubber = bundle_.step(seconds, force_N_, SHEAR_N_mm2 * touching_mm, touching_mm, {vx_mm_s_, vy_mm_s_, 0.0});
+  bundle_.step(seconds, force_N_, SHEAR_N_mm2 * touching_mm, {vx_mm_s_, vy_mm_s_});
   if (way_ != Way::hand) {
-    vx_mm_s_ += mN_PER_N * (load_x_N_ + rubber.x_N) / mass_kg_ * seconds;
-    vy_mm_s_ += mN_PER_N * (load_y_N_ + rubber.y_N) / mass_kg_ * seconds;
+    vx_mm_s_ += mN_PER_N * (load_x_N_ - bundle_.pull_x_N()) / mass_kg_ * seconds;
+    vy_mm_s_ += mN_PER_N * (load_y_N_ - bundle_.pull_y_N()) / mass_kg_ * seconds;
   }
   x_mm_ += vx_mm_s_ * seconds;
   y_mm_ += vy_mm_s_ * seconds;
