@@ -28,6 +28,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
 from fingertip import Fingertip, host_time, validate  # noqa: E402
 from fingertip.files import PITCH_mm, SENSOR_X_mm, SENSOR_Y_mm  # noqa: E402
+from fingertip.fit import firmware  # noqa: E402
 from fingertip.line import Capability  # noqa: E402
 from fingertip.validation import assess, protocol  # noqa: E402
 from fingertip.validation.marks_fit import MARKS_MIN, fit_marks  # noqa: E402
@@ -453,6 +454,7 @@ class Command(ValidateTest):
 
     def test_without_the_solver_it_states_what_to_install(self):
         with mock.patch.dict(os.environ, {"FINGERTIP_TOOL": "", "PATH": ""}):
+            firmware.cache_clear()
             with self.assertRaisesRegex(assess.InputError, "the command fingertip computes this, and is not installed"):
                 assess.solve_gains(ARRAY, [], 3.0)
 

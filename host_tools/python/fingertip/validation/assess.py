@@ -11,16 +11,16 @@ import json
 import math
 import pathlib
 import statistics
-import subprocess
 from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
-from ..fit import tool
+from ..fit import firmware
 from ..line import Capability, Stored
 from .marks_fit import LOOSE_SCATTER, MARKS_MIN, RESPONDS_SHARE, fit_marks
 from .measure import AFTER_s
+from .placements import bits_of
 from .protocol import GRAVITY_N_PER_g
 from .pulls import upper_median
 
@@ -85,17 +85,16 @@ def _named(sensors):
 
 
 def solve_gains(array, placements, force_N):
-    """What `fingertip calibrate` finds of these placements: there is one solver of a calibration. Raises InputError."""
-    asked = {"x_mm": list(array.x_mm), "y_mm": list(array.y_mm), "pitch_mm": array.pitch_mm, "force_N": force_N}
-    own = (
-        {"usable": np.flatnonzero(one.usable).tolist(), "reading_Pa": list(one.reading_Pa), "rest_Pa": list(one.rest_Pa)}
-        for one in placements
-    )
-    asked["placements"] = [one._asdict() | lists for one, lists in zip(placements, own)]
-    done = subprocess.run([tool(), "calibrate", "--placements"], input=json.dumps(asked), capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise InputError(done.stderr.strip().removeprefix("fingertip: ") or f"{tool()}: failed; see that it is of this version")
-    return json.loads(done.stdout)
+    """(solved_placements of host_tools/tool/arrays/placements.cpp, [gain, sd] by sensor): there is one solver of a calibration. Raises InputError."""
+    library = firmware()
+    found, solved = library.made("found_placement", len(placements)), library.made("solved_placements", 1)
+    for name in ("t_s", "noise_Pa", "fading"):
+        found[name] = [getattr(one, name) for one in placements]
+    found["usable"] = [bits_of(one.usable) for one in placements]
+    levels = np.array([(one.reading_Pa, one.rest_Pa) for one in placements]).reshape(-1, 2, array.sensors)
+    gains = np.zeros((2, array.sensors))
+    library.call("solve_placements", array.x_mm, array.y_mm, array.pitch_mm, force_N, found, levels, solved, gains)
+    return solved[0], gains
 
 
 def why_no_tangential(pad):
@@ -278,13 +277,12 @@ class Card:
                     to = self.place[k]
                     usable[to], reading_Pa[to], rest_Pa[to] = True, at.reading_Pa[k], at.rest_Pa[k]
             placements.append(at._replace(usable=usable, reading_Pa=reading_Pa, rest_Pa=rest_Pa))
-        self.solution = solve_gains(self.array, placements, self.weight_N)
+        self.solution, gains = solve_gains(self.array, placements, self.weight_N)
         self.gain, self.gain_sd = np.zeros(self.sensors), np.zeros(self.sensors)
         if not self.solution["solved"]:
             return
         known = np.flatnonzero(~self._dead & ~self._loose)
-        self.gain[known] = np.array(self.solution["gain"])[self.place[known]]
-        self.gain_sd[known] = np.array(self.solution["gain_sd"])[self.place[known]]
+        self.gain[known], self.gain_sd[known] = gains[:, self.place[known]]
         self._add("gain_spread_percent", "gains of the sensors differ by, sd", "%", 100 * _sd(np.log(self.gain[known])), 1)
         self._add("gain_sd_percent", "each gain is known to, median sd", "%", 100 * statistics.median(self.gain_sd[known]), 1)
         if self.is_calibrated:
@@ -358,7 +356,7 @@ class Card:
         """By the stored calibration, or by the readings of a pad whose sensors measure the pressure on the base."""
         ratio, found = self._force_over_weight, self.solution
         if not self.is_calibrated or not ratio > 0:
-            if not found.get("force_scale"):
+            if not found["force_scale"]:
                 return
             ratio = 1 / (found["force_scale"] * found["force_ratio"] * READS_OF_FORCE)
         self._add("weight_ratio", "force by the readings, over the weight as given", "", ratio, 2)

@@ -137,7 +137,7 @@ def _gains(card):
 
 def _profile(card):
     found = card.solution
-    if not found.get("peak_Pa", 0) > 0:
+    if not found["peak_Pa"] > 0:
         return ""
     plot = Plot(440, 260, (0.0, _FAR_mm), (-0.1, 1.15), "distance from the press, mm", "reading over gain, of the peak")
     places = np.column_stack([card.array.x_mm, card.array.y_mm])[card.fit.place]
@@ -243,5 +243,5 @@ def card_json(card):
         "pulls": pulls,
         "pull_note": card.pull_note,
         "calibrated": card.is_calibrated,
-        "calibration": card.solution["judgement"],
+        "calibration": card.solution["judgement"].decode(),
     }

@@ -15,10 +15,6 @@
 #include "tool/cli/command_line.hpp"
 #include "tool/cli/names_of_values.hpp"
 
-extern "C" {
-#include "common/limits.h"
-}
-
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -26,7 +22,6 @@ extern "C" {
 #include <ctime>
 #include <functional>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <poll.h>
 #include <string>
 #include <unistd.h>
@@ -55,7 +50,6 @@ struct CalibrateOptions {
   bool dry_run = false;          /* of a recording, write nothing */
   bool yes = false;              /* ask nothing */
   bool show = false, erase = false;
-  bool placements = false; /* of another program */
   ColourMode colour = ColourMode::automatic;
 };
 
@@ -406,92 +400,6 @@ void calibrate_drag(const CalibrateOptions &options) {
   }
 }
 
-struct Asked {
-  calibrating::Array array;
-  double force_N = 0.0;
-  std::vector<Placement> placements;
-};
-
-Asked asked_of(const nlohmann::json &text) {
-  Asked asked;
-  asked.array = {text.at("pitch_mm"), text.at("x_mm"), text.at("y_mm")};
-  asked.force_N = text.at("force_N");
-  const std::size_t sensors = asked.array.sensors();
-  for (const nlohmann::json &each : text.at("placements")) {
-    Placement placement;
-    each.at("t_s").get_to(placement.t_s);
-    each.at("reading_Pa").get_to(placement.reading_Pa);
-    each.at("rest_Pa").get_to(placement.rest_Pa);
-    each.at("noise_Pa").get_to(placement.noise_Pa);
-    each.at("fading").get_to(placement.fading);
-    for (std::size_t k : each.at("usable")) {
-      placement.usable |= k < sensors ? std::uint32_t{1} << k : 0u;
-    }
-    if (placement.reading_Pa.size() != sensors || placement.rest_Pa.size() != sensors) {
-      throw Error("a placement has " + std::to_string(placement.reading_Pa.size()) + " readings, and there are " + std::to_string(sensors) +
-                  " sensors");
-    }
-    asked.placements.push_back(std::move(placement));
-  }
-  if (sensors < 1 || sensors > FT_MAX_SENSORS || asked.array.y_mm.size() != sensors) {
-    throw Error("x_mm and y_mm do not have one value for each of 1 to " + std::to_string(FT_MAX_SENSORS) + " sensors");
-  }
-  return asked;
-}
-
-double force_ratio_of(const calibrating::Array &array, double thickness_mm) {
-  wire_info info{};
-  info.sensor_count = static_cast<std::uint8_t>(array.sensors());
-  info.pitch_mm = static_cast<float>(array.pitch_mm);
-  std::copy(array.x_mm.begin(), array.x_mm.end(), info.x_mm);
-  std::copy(array.y_mm.begin(), array.y_mm.end(), info.y_mm);
-  const double layer_mm = std::clamp(thickness_mm, double(PAD_THICKNESS_MIN_mm), double(PAD_THICKNESS_MAX_mm));
-  return static_cast<double>(pad::profile_of({layer_mm}, info).force_ratio);
-}
-
-nlohmann::json found_in(const Asked &asked) {
-  const calibrating::Judgement judgement = calibrating::judge(asked.array, asked.placements, true);
-  const calibrating::Solution &solution = judgement.solution;
-  if (!solution.solved) {
-    return {{"judgement", judgement.text}, {"solved", false}};
-  }
-  const pad::Thickness thickness = pad::thickness_of(solution.sigma_mm, solution.sigma_sd_mm);
-  nlohmann::json found = {{"judgement", judgement.text},
-                          {"solved", true},
-                          {"gain", solution.gain},
-                          {"gain_sd", solution.gain_sd},
-                          {"peak_Pa", solution.peak_Pa},
-                          {"width_mm", solution.width_mm},
-                          {"mixing", solution.mixing},
-                          {"dip", solution.dip},
-                          {"dip_share", solution.dip_share},
-                          {"dip_sd_mm", solution.dip_sd_mm},
-                          {"sigma_mm", solution.sigma_mm},
-                          {"thickness_mm", thickness.mm},
-                          {"thickness_sd_mm", thickness.sd_mm}};
-  if (const auto scale =
-          calibrating::force_scale(asked.array, asked.placements, solution, asked.force_N, calibrating::shape_of(solution))) {
-    found["force_scale"] = scale->scale;
-    found["force_ratio"] = force_ratio_of(asked.array, thickness.mm);
-  }
-  return found;
-}
-
-/* fingertip calibrate --placements, for programs that find placements themselves, as the package's
- * `validate` does. Reads JSON from standard input:
- *   x_mm, y_mm      [sensor]     pitch_mm     force_N of the weight
- *   placements      in the order of time, of each t_s, reading_Pa, rest_Pa [sensor], usable (numbers of the sensors
- *                   whose reading is a measurement), noise_Pa, fading (calibration/solver.hpp)
- * Prints the solution as JSON; without "solved" the placements are too few. Throws Error. */
-int calibrate_placements() {
-  try {
-    std::printf("%s\n", found_in(asked_of(nlohmann::json::parse(stdin))).dump().c_str());
-  } catch (const nlohmann::json::exception &error) {
-    throw Error("standard input: no placements (" + std::string(error.what()) + ")");
-  }
-  return 0;
-}
-
 int run_calibrate(const CalibrateOptions &options) {
   const auto chosen = options.show ? show : options.erase ? erase : options.drag ? calibrate_drag : calibrate;
   try {
@@ -518,9 +426,6 @@ void add_calibrate(CommandLine &line) {
     if (options->dry_run && options->from.empty()) {
       throw WrongUsage("--dry-run goes with --from; without, it asks before it writes");
     }
-    if (options->placements) {
-      return calibrate_placements();
-    }
     if (options->drag && !options->force_N) {
       throw WrongUsage("--drag needs the pull: --weight GRAMS on the string, or --force N");
     }
@@ -543,10 +448,6 @@ void add_calibrate(CommandLine &line) {
       command->add_flag("--show", options->show, "Show the fingertip's calibration")->excludes(weight, force, drag, from, dry_run, yes);
   command->add_flag("--erase", options->erase, "Erase its calibration, after a question")
       ->excludes(weight, force, drag, from, dry_run, show);
-  command
-      ->add_flag("--placements", options->placements,
-                 "For programs: only solve the placements that standard input has, and print the solution, both as JSON")
-      ->excludes(weight, force, drag, from, dry_run, yes, show);
   with_colour(command, options->colour);
 }
 
