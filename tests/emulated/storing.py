@@ -3,19 +3,19 @@
 import concurrent.futures
 import json
 import pathlib
-import struct
 import tempfile
-import zlib
 
 import numpy as np
 from boards import PARALLEL as BOARD
 from emulation import MAIN, options
 from emulated import CONVERSION_us, MARGIN, Tools, contact_times_us, distribution, scenario
 from fingertip.files import InputError, read_recording
+from fingertip.line import Calibration, StoreCalibration
+from fingertip.wire import Packet, encode
 from reporting import run
 
 OSR = 256
-WIRE_VERSION, CALIBRATE, SENSORS = 9, 0x88, 15
+CALIBRATE, SENSORS = 0x88, 15
 # From one command to the next: an erase of the slowest flash and all that follows.
 INTERVAL_s = 0.6
 # Gains cost time in each frame, so what is compared has them from here on.
@@ -24,18 +24,12 @@ FROM_s = 1.1
 KEPT_FIGURES = ("frames", "skipped", "erases", "programs", "latency_us")
 
 
-def stuffed(packet):
-    """COBS and the delimiter, firmware/wire/PROTOCOL.md; no run of a command is 254 bytes long."""
-    return b"".join(bytes([len(run) + 1]) + run for run in packet.split(b"\0")) + b"\0"
-
-
 def calibrate_frame(number):
     """A calibration that differs from the others, and hardly from the scenario's sensors: a fit that finds an outlier takes longer than a frame."""
-    body = struct.pack("<BIHffHHHHB", SENSORS, 1785931200 + number, 30, 1 + 0.001 * number, 0.02, 5700, 60, 0, 0, 101)
-    body += b"".join(struct.pack("<ff", 1 + 0.0001 * ((k + number) % 20), 0.01) for k in range(SENSORS))
-    body += b"".join(struct.pack("<hhh", k, -((k + number) % 20), 10 * k) for k in range(SENSORS))
-    packet = struct.pack("<BBHQ", WIRE_VERSION, CALIBRATE, number, 0) + body
-    return stuffed(packet + struct.pack("<I", zlib.crc32(packet))).hex()
+    gains = [value for k in range(SENSORS) for value in (1 + 0.0001 * ((k + number) % 20), 0.01)]
+    places = [value for k in range(SENSORS) for value in (k, -((k + number) % 20), 10 * k)]
+    calibration = Calibration(1785931200 + number, 30, 1 + 0.001 * number, 0.02, 5700, 60, 0, 0, 101, tuple(gains), tuple(places))
+    return encode(Packet(number, 0, StoreCalibration(SENSORS, calibration))).hex()
 
 
 class Run:

@@ -1,6 +1,6 @@
-"""What `fingertip doctor` says of emulated fingertips, each with one thing wrong, and of good ones; on simulated time. Most faults at night.
+"""What `fingertip doctor` says of emulated fingertips, each with one thing wrong, and of good ones; on simulated time. Each fault: tests/unit/doctor.
 
-usage: test_doctor.py --boards FOLDER --support FOLDER --node NODE Doctor|Faults
+usage: test_doctor.py --boards FOLDER --support FOLDER --node NODE
 """
 
 import argparse
@@ -19,7 +19,7 @@ TOOLS = argparse.Namespace()
 BOARDS = ("pico_mux", "pico_parallel")
 
 
-class Examined(unittest.TestCase):
+class Doctor(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(cls.enterClassContext(tempfile.TemporaryDirectory()))
@@ -36,13 +36,13 @@ class Examined(unittest.TestCase):
         self.plugged_in = 0
         self.world = self.enterContext(World(TOOLS.support, TOOLS.node, self.folder))
 
-    def plug_in(self, board, faults=(), sensor="ms5840"):
+    def plug_in(self, board, faults=()):
         """An emulated fingertip; returns its port."""
         self.plugged_in += 1
         port, plan = self.folder / f"port-{self.plugged_in}", self.folder / "faults.json"
         plan.write_text(json.dumps([{"from_s": 0, **fault} for fault in faults]))
         image = f"{TOOLS.boards}/{board}/fingertip-{board}.bin"
-        more = options(sensor=sensor, faults=plan, seconds=3600, fast_enumeration=True)
+        more = options(faults=plan, seconds=3600, fast_enumeration=True)
         self.world.emulator(port, *options(board=board, image=image, scenario=self.at_rest), *more)
         return port
 
@@ -64,8 +64,6 @@ class Examined(unittest.TestCase):
         self.assertEqual([finding["verdict"] for finding in found], [verdict], findings)
         return found[0]
 
-
-class Doctor(Examined):
     def test_nothing_is_wrong_with_good_ones(self):
         for board in BOARDS:
             port = self.plug_in(board)
@@ -122,53 +120,6 @@ class Doctor(Examined):
         self.assertEqual([(finding["check"], finding["verdict"]) for finding in findings], [("port", "bad")])
         name = pathlib.Path("/proc/self/comm").read_text().strip()
         self.assertIn(f"in use by another program: {name} (process {os.getpid()})", findings[0]["text"])
-
-
-class Faults(Examined):
-    def test_nothing_is_wrong_at_any_oversampling(self):
-        for board in BOARDS:
-            port = self.plug_in(board)
-            for osr in (256, 8192):
-                self.world.tool("set", "--port", port, f"osr={osr}")
-                self.assertEqual(self.examine(port, seconds=2), [], (board, osr))
-
-    def test_sensors_that_are_not_those_of_the_image(self):
-        found = self.only(self.examine(self.plug_in(BOARDS[0], sensor="ms5837_30ba")), "sensors", "bad")
-        self.assertIn("5 kPa at rest", found["text"])
-        self.assertIn("not those of the firmware", found["text"])
-
-    def test_a_dead_multiplexer(self):
-        findings = self.examine(self.plug_in("pico_mux", [{"type": "mux_dead", "mux": 1}]))
-        finding = self.only(findings, "sensors", "bad")
-        self.assertIn("multiplexer 0x71 does not answer", finding["text"])
-        self.assertIn("RESET on GP7 (pin 10)", finding["advice"])
-        self.assertEqual([sensor["sensor"] for sensor in finding["sensors"]], [5, 6, 7, 8, 9])
-
-    def test_a_line_held_low(self):
-        findings = self.examine(self.plug_in("pico_mux", [{"type": "line_stuck_low", "sensor": 12}]))
-        finding = self.only(findings, "sensors", "bad")
-        self.assertIn("strip 2, sensors 10, 11, 12, 13, 14: a line behind multiplexer 0x72 is held low", finding["text"])
-        findings = self.examine(self.plug_in("pico_parallel", [{"type": "line_stuck_low", "sensor": 12}]))
-        finding = self.only(findings, "sensors", "bad")
-        self.assertIn("SDA on GP12 (pin 16)", finding["text"])
-        self.assertIn("held low", finding["advice"])
-
-    def test_a_bad_prom(self):
-        for board in BOARDS:
-            findings = self.examine(self.plug_in(board, [{"type": "sensor_prom_bit", "sensor": 3}]), seconds=2)
-            finding = self.only(findings, "prom", "bad")
-            self.assertEqual([sensor["sensor"] for sensor in finding["sensors"]], [3])
-            self.assertEqual({finding["check"] for finding in findings}, {"prom"})
-
-    def test_a_noisy_sensor(self):
-        for board in BOARDS:
-            findings = self.examine(self.plug_in(board, [{"type": "sensor_noisy", "sensor": 11}]), seconds=2)
-            finding = self.only(findings, "noise", "bad")
-            self.assertEqual([sensor["sensor"] for sensor in finding["sensors"]], [11])
-            self.assertLessEqual({finding["check"] for finding in findings}, {"noise", "zero"})
-            noise_Pa = [sensor["noise_Pa"] for sensor in self.result["measured"]["sensors"]]
-            self.assertAlmostEqual(noise_Pa[11], 39, delta=4)
-            self.assertLess(max(noise_Pa[:11]), 4.5)
 
 
 if __name__ == "__main__":

@@ -205,7 +205,7 @@ class Use(PageTest):
 
 
 class Calibrate(PageTest):
-    """As the tool's own test of the emulated image does, in the browser: host time does not matter, the image runs as fast as it can."""
+    """On the emulated image, which runs as fast as it can: host time does not matter."""
 
     PLACEMENTS = ("--effects", "gain=10", "--seed", 41, "--pad", 7)
 
