@@ -108,6 +108,9 @@ void PlacementFinder::find_rest(double t_s) {
 }
 
 std::optional<Placement> PlacementFinder::close(const Slot &slot) {
+  if (std::all_of(slot.counts.begin(), slot.counts.end(), [](int count) { return count == 0; })) {
+    return std::nullopt; /* all sensors were doubted: nothing is known of this time */
+  }
   slots_.push_back(slot);
   while (slots_.front().begin_s < slot.begin_s - KEEPS_s) {
     slots_.pop_front();

@@ -108,6 +108,17 @@ TEST(Placements, zeros_that_are_off_or_move_do_not_matter) {
   }
 }
 
+TEST(Placements, frames_without_a_reading_end_none) {
+  Feed feed(50.0);
+  feed.rest(1.0);
+  feed.press();
+  feed.valid = 0; /* all are doubted, as after a brisk press */
+  feed.stand(0.2);
+  feed.valid = 0x7FFF;
+  feed.stand(1.5);
+  EXPECT_EQ(feed.found.size(), 1u);
+}
+
 TEST(Placements, one_for_each_until_it_is_lifted) {
   Feed feed;
   feed.rest(1.0);
