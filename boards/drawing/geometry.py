@@ -27,7 +27,7 @@ def descriptor(folder):
     paths = folder.with_name("board.json"), *folder.glob("board.json")
     found, *own = (json.loads(path.read_text(encoding="utf-8")) for path in paths)
     for other in own:
-        found |= other | {"wiring": found["wiring"] | other["wiring"]}
+        found |= other | {"wiring": found["wiring"] | other.get("wiring", {})}
     return found
 
 
