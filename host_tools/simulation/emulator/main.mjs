@@ -35,7 +35,6 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --flash FILE         what the flash holds beside the image, 2 MiB, from an earlier run; written again at the end of this one
   --slow-flash         the flash takes the longest times of its datasheet instead of the typical ones
   --fast-enumeration   shorten the host's debounce and reset waits
-  --allow-watchdog     a watchdog reboot is no warning
 
   --pty LINK           serve the CDC port as a pseudo-terminal, LINK is a symbolic link to it
   --wait-open          power on only when the pseudo-terminal was opened
@@ -51,7 +50,6 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
                        lies ready that the machine does not ask for, emulated time waits, 2 s at most
   --sync-strobe MS     drive the sync pin: high for a millisecond at each multiple of MS, 2 to 60000; since power-on, with
                        --stepped on the clock of the program, so that several emulators are on one wire
-  --sync-log FILE.csv  changes of the sync pin, by the chip or the wire: t_ns,level
   --host-script FILE   with the built-in host: lines "TIME_S HEXBYTES", "TIME_S dtr 0|1", "TIME_S baud N", comments "#"
   --capture FILE       every byte received on bulk IN
 
@@ -180,8 +178,6 @@ async function run(options) {
       });
     const usbLog = output(options['usb-log'], 't_ns,endpoint,dir,length,bytes,offered_ns');
 
-    const syncLog = output(options['sync-log'], 't_ns,level');
-
     while (options['wait-open'] && !pty.isOpen && !interrupted && !pty.failure) await sleep(5);
 
     const machine = new Machine({
@@ -196,12 +192,10 @@ async function run(options) {
       serial: options.serial,
       clock_ppm: options['clock-ppm'],
       fastEnumeration: options['fast-enumeration'],
-      allowWatchdog: options['allow-watchdog'],
       sync: {
         next: options['sync-strobe']
           ? (t_ns) => strobe({ period_ns: options['sync-strobe'] * 1e6, high_ns: STROBE_HIGH_NS, zero_ns: stepped?.zero_ns })(t_ns)
           : null,
-        onLevel: (high, t_ns) => syncLog.write(Buffer.from(`${t_ns.toFixed(1)},${high ? 1 : 0}\n`)),
       },
       rise_ns: options['rise-ns'],
       onLevels: vcd ? (levels, t_ns) => vcd.change(levels, t_ns) : undefined,
