@@ -96,7 +96,7 @@ static enum fit_shapes_progress forget(struct fit_shapes_state *state, struct fi
 }
 
 static enum fit_shapes_progress answer(const struct fit_shapes_pad *pad, struct fit_shapes_state *state, struct fit_shapes_result *result) {
-  int best = fit_shapes_best(pad, state->chi_square_q8, state->at);
+  int best = fit_shapes_best(state->chi_square_q8, state->at);
   *result = (struct fit_shapes_result){0};
   for (int m = 0; m < MODELS; m++) {
     result->chi_square[m] = fit_float(state->chi_square_q8[m], -8);
@@ -142,10 +142,7 @@ enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct f
     follow(pad, fit, state, fit_grid_sum_q20(pad->room.frame.q28));
   }
   if (state->frames == 0) {
-    fit_shapes_begin(pad, fit, state->part, state);
-    if (++state->part < BEGIN_PARTS) {
-      return FIT_SHAPES_UNFINISHED;
-    }
+    fit_shapes_begin(pad, fit, state);
     forget(state, result);
     state->frames = 1;
     return FIT_SHAPES_ANSWERED;

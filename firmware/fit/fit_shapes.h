@@ -8,7 +8,7 @@
  * Each takes one damped Gauss-Newton step a frame, from where the frame before ended, so the cost is fixed. A contact at rest has its
  * answer after FIT_SHAPES_FRAMES frames, and then in every other one, which does not step. A model with more unknowns is chosen where it
  * makes chi^2 + FIT_SHAPES_ERRORS less by a quarter; NUMERICS.md ("Contact shape") has the models, the choice and its limits. ELONGATED is
- * longer than round by the variance of a line of 0.9 pitches, and explains twice as much as a pull: 97 % of limes, fingers and what else is
+ * longer than round by the variance of a line of 0.7 pitches, and explains twice as much as a pull: 97 % of limes, fingers and what else is
  * as wide as that are not. What the other models make of the place is part of location_sd_mm, by how likely they are.
  *
  * Fixed point, the same bits on every machine, for the rectangle that the build knows, some sensors missing. No

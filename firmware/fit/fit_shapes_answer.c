@@ -9,12 +9,12 @@
 #define EDGE_SURE 0.5f      /* standard deviations by which a line is longer than the shortest edge */
 #define PULL_MODEL_SD 0.04f /* pitches^2 per Q / F: variance along a line by what the model of a pull is off by */
 #define THIRD_Q16 21845
-#define LEAST_VARIANCE_Q20 (ONE_Q20 / 15) /* of a line of 0.9 pitches: shorter ones are no edges */
+#define LEAST_VARIANCE_Q20 (ONE_Q20 / 24) /* of a line of 0.7 pitches: shorter ones are no edges */
 #define SEPARATION_HALF_Q10 256           /* of half a pitch: nearer pairs are long contacts */
 #define BESIDE_Q20 (1 << 19)              /* half a pitch */
 #define SQUARE 3                          /* half a square's side, squared, over its spread */
-#define LEAST_SPREAD_CHI_SQUARE 8         /* no contact has that */
-#define LONGEST_HALF_Q10 1408             /* of 11/4 pitches: a longer line is rarer than a pair */
+#define BALL 20                           /* radius of a ball whose contact's is half of it, squared, over its spread */
+#define LONGEST_HALF_Q10 1408             /* of 11/4 pitches: a longer line is rarer than a pair of balls */
 
 /* Variance of a sum of the unknowns times these, each at most some pitches or units of the readings. */
 static NOINLINE struct scaled variance_of_sum(const struct fit_shapes_equations *equations, const int32_t *by_q20) {
@@ -157,14 +157,12 @@ static bool can_be_two(const struct fit_shapes_at *pair) {
          reach_x < (COLUMNS - 1) * (ONE_Q20 / 2) + BESIDE_Q20 && reach_y < (ROWS - 1) * (ONE_Q20 / 2) + BESIDE_Q20;
 }
 
-int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8, const struct fit_shapes_at *at) {
+int fit_shapes_best(const int32_t *chi_square_q8, const struct fit_shapes_at *at) {
   int32_t round = chi_square_q8[ROUND], line = chi_square_q8[LONG], pair = chi_square_q8[TWO];
-  bool is_longest = fit_shapes_span_square(at[LONG].value) > LONGEST_HALF_Q10 * LONGEST_HALF_Q10;
-  /* A point's spread is 0, and the least is far from that. */
-  bool is_narrow = fit_shapes_is_narrowest(pad, at[TWO].value[SPREAD]);
-  int32_t doubted = pair + (is_narrow ? LEAST_SPREAD_CHI_SQUARE << 8 : 0);
-  bool is_no_line = is_longest ? explains_as_well(pair, line) : explains_more(doubted, line, BY_A_QUARTER);
-  if (can_be_two(&at[TWO]) && explains_more(doubted, round, BY_A_QUARTER) && is_no_line) {
+  bool is_likely = fit_shapes_span_square(at[LONG].value) > LONGEST_HALF_Q10 * LONGEST_HALF_Q10 &&
+                   fit_shapes_span_square(at[TWO].value) > BALL * at[TWO].value[SPREAD];
+  bool is_no_line = is_likely ? explains_as_well(pair, line) : explains_more(pair, line, BY_A_QUARTER);
+  if (can_be_two(&at[TWO]) && explains_more(pair, round, BY_A_QUARTER) && is_no_line) {
     return TWO;
   }
   return explains_more(line, round, BY_A_QUARTER) ? LONG : ROUND;

@@ -9,16 +9,7 @@
 #define START_MAX (((COLUMNS > ROWS ? COLUMNS : ROWS) / 2 * 2 + 3) * (ONE_Q20 / 2))
 static int32_t pitches_q20(float pitches) { return fixed_clamp(fit_fixed(pitches, 20), -START_MAX, START_MAX); }
 
-/* Where the pair may be: along the Gaussian's longer axis, equal or three to one either way; or
- * under the largest reading and where it leaves most. */
-static void set_pair(float x, float y, float dx, float dy, float share, struct fit_shapes_at *at) {
-  at->value[PLACE_X] = pitches_q20(x - share * dx);
-  at->value[PLACE_Y] = pitches_q20(y - share * dy);
-  at->value[SPAN_X] = pitches_q20(dx);
-  at->value[SPAN_Y] = pitches_q20(dy);
-  at->value[BALANCE] = fit_fixed(share, 20);
-}
-
+/* Under the largest reading, and where it leaves most. */
 static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad, struct fit_shapes_at *at) {
   const struct fit_shapes_frame *readings = &pad->room.frame;
   int first = 0, second = -1;
@@ -68,7 +59,7 @@ static NOINLINE int32_t residuals_at(struct fit_shapes_pad *pad, struct fit_shap
   return sum_q16;
 }
 
-void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, int part, struct fit_shapes_state *state) {
+void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, struct fit_shapes_state *state) {
   const float per = pad->per_pitch;
   struct fit_shapes_at at = {{0}};
   float variance = fit->sigma_mm * fit->sigma_mm * per * per;
@@ -102,21 +93,9 @@ void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, 
   at.value[SPAN_X] = pitches_q20(line * along_x);
   at.value[SPAN_Y] = pitches_q20(line * along_y);
   state->at[LONG] = at;
-  int32_t *least = &state->chi_square_q8[TWO];
-  *least = part == 0 ? INT32_MAX : *least;
-  for (int start = 2 * part; start < 2 * part + 2; start++) {
-    static const float share[3] = {0.0f, 0.5f, -0.5f};
-    struct fit_shapes_at pair = at;
-    if (start < 3) {
-      float by = share[start] == 0.0f ? reach : 1.1547005f * reach;
-      set_pair(x, y, by * along_x, by * along_y, share[start], &pair);
-    } else {
-      set_pair_by_readings(pad, &pair);
-    }
-    int32_t squares = residuals_at(pad, &pair);
-    if (squares < *least) {
-      *least = squares;
-      state->at[TWO] = pair;
-    }
-  }
+  struct fit_shapes_at pair = at;
+  set_pair_by_readings(pad, &pair);
+  at.value[SPAN_X] = pitches_q20(reach * along_x);
+  at.value[SPAN_Y] = pitches_q20(reach * along_y);
+  state->at[TWO] = residuals_at(pad, &pair) < residuals_at(pad, &at) ? pair : at;
 }

@@ -64,20 +64,14 @@ void fit_shapes_round_places(struct fit_shapes_at *at);
 void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count, const struct fit_shapes_at *where,
                          struct fit_shapes_equations *equations);
 
-/* Whether a spread is at its least, but for what fit_shapes_round_places makes of it. */
-static inline bool fit_shapes_is_narrowest(const struct fit_shapes_pad *pad, int32_t spread_q20) {
-  return spread_q20 < pad->spread_least_q20 + 256;
-}
-
 /* Of half a line, or of half of what lies between two, Q20. */
 static inline int32_t fit_shapes_span_square(const int32_t *at) {
   int32_t x_q10 = at[SPAN_X] >> 10, y_q10 = at[SPAN_Y] >> 10;
   return x_q10 * x_q10 + y_q10 * y_q10;
 }
 
-/* fit_shapes_begin.c. A pair has four starts, of which two are tried in each of two parts. */
-#define BEGIN_PARTS 2
-void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, int part, struct fit_shapes_state *state);
+/* fit_shapes_begin.c */
+void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, struct fit_shapes_state *state);
 
 /* fit_shapes_step.c. The column of the residuals, and the sum of the squares with those of the priors; chi^2 of both,
  * Q8; and after these, of the model's rows, one damped step, or the factors of the matrix that answers. */
@@ -88,6 +82,6 @@ void fit_shapes_step(struct fit_shapes_pad *pad, int model, const struct priors 
 void fit_shapes_factorise(struct fit_shapes_pad *pad, int model, const struct priors *priors, const struct fit_shapes_at *at);
 
 /* fit_shapes_answer.c. at: where each model is. */
-int fit_shapes_best(const struct fit_shapes_pad *pad, const int32_t *chi_square_q8, const struct fit_shapes_at *at);
+int fit_shapes_best(const int32_t *chi_square_q8, const struct fit_shapes_at *at);
 void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8, const struct fit_shapes_state *state,
                          struct fit_shapes_result *result);

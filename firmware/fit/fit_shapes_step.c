@@ -193,10 +193,10 @@ int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad, const struct fit
   return fit_scaled_to_fixed(scaled_div(squares, scaled_mul(base, base)), 8);
 }
 
-/* At a limit that it wants to pass the spread is no unknown: the others would step as if it moved. */
+/* At a limit that it wants to pass, but for rounding, the spread is no unknown: the others would step as if it moved. */
 static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equations *equations, int32_t spread) {
   int32_t right = equations->right[SPREAD];
-  if (!((fit_shapes_is_narrowest(pad, spread) && right < 0) || (spread > pad->spread_most_q20 - 256 && right > 0))) {
+  if (!((spread < pad->spread_least_q20 + 256 && right < 0) || (spread > pad->spread_most_q20 - 256 && right > 0))) {
     return;
   }
   for (int u = 0; u < SPREAD; u++) {

@@ -9,7 +9,7 @@
 
 Pads and touches are the twin's, with a dip and calibrated; the code that answers is the firmware's own, compiled for the host. No public
 recording has two contacts and their truth, so nothing here was seen on a real pad. Constants were chosen with the seeds 20000 and 30000,
-how a packet's place is doubted with 50000 and 60000, what is an edge with 1.
+how a packet's place is doubted with 50000 and 60000, what is an edge with 1, 21 to 24 and 31 to 34.
 """
 
 import pathlib

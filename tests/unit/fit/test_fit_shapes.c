@@ -109,8 +109,6 @@ TEST(test_a_round_press_is_one_at_its_place_and_force) {
     TEST_ASSERT_FLOAT_WITHIN(0.02f * (float)force, (float)force, result.force_N[0]);
     TEST_ASSERT_TRUE(result.location_sd_mm[0] > 0.0f && result.location_sd_mm[0] < 0.6f);
     TEST_ASSERT_TRUE(result.force_sd_N[0] > 0.0f);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, result.length_mm);
-    TEST_ASSERT_EQUAL_FLOAT(0.0f, result.force_N[1]);
   }
 }
 
@@ -234,11 +232,11 @@ TEST(test_what_a_shape_does_not_have_is_zero) {
   TEST_ASSERT_EQUAL_FLOAT(0.0f, result.length_mm);
 }
 
-/* They lack the variance of a line of 8.05 mm beyond that across. */
+/* They lack the variance of a line of 6.3 mm beyond that across. */
 TEST(test_what_is_short_or_as_wide_is_no_edge) {
   for (int i = 0; i < 40; i++) {
     clear();
-    line(0.0, any(-8.0, 8.0), i % 2 ? 8.5 : 10.0, any(-0.5 * PI, 0.5 * PI), 8.0);
+    line(0.0, any(-8.0, 8.0), i % 2 ? 7.0 : 8.5, any(-0.5 * PI, 0.5 * PI), 8.0);
     TEST_ASSERT_EQUAL(FIT_SHAPE_ROUND, held());
   }
 }
@@ -314,7 +312,7 @@ static int best(int32_t of_round, int32_t of_line, int32_t of_pair) {
   struct fit_shapes_at at[MODELS] = {{{0}}};
   memcpy(at[TWO].value, pair, sizeof pair);
   memcpy(at[LONG].value, straight, sizeof straight);
-  return fit_shapes_best(&pad, (const int32_t[MODELS]){of_round, of_line, of_pair}, at);
+  return fit_shapes_best((const int32_t[MODELS]){of_round, of_line, of_pair}, at);
 }
 static void set_pair(int32_t span_x, int32_t span_y) {
   memset(pair, 0, sizeof pair);
@@ -358,6 +356,8 @@ TEST(test_a_pair_that_looks_too_long_may_explain_a_little_less) {
     straight[axis] = -half - step;
     TEST_ASSERT_EQUAL(TWO, best(1 << 20, of_line, most - 1));
     TEST_ASSERT_EQUAL(LONG, best(1 << 20, of_line, most));
+    pair[SPREAD] = ONE_Q20 / 80 + 1; /* wider than the contacts of balls that touch each other */
+    TEST_ASSERT_EQUAL(LONG, best(1 << 20, of_line, most - 1));
     TEST_ASSERT_EQUAL(ROUND, best(of_line, of_line, of_line)); /* what a round contact explains is none */
   }
 }
@@ -416,15 +416,6 @@ TEST(test_a_place_is_held_as_far_beside_each_side) {
     const int32_t place_q20 = state.at[ROUND].value[i & 1 ? PLACE_Y : PLACE_X] + ONE_Q20 / 2;
     TEST_ASSERT_INT32_WITHIN(ONE_Q20 / 4, (int32_t)side * 3 * ONE_Q20, place_q20);
   }
-}
-
-TEST(test_a_pair_of_no_spread_must_explain_more) {
-  const int32_t of_pair = FREEDOM << 8;
-  set_pair(ONE_Q20 / 2, 0);
-  pair[SPREAD] = pad.spread_least_q20 + 256;
-  TEST_ASSERT_EQUAL(TWO, best(1 << 20, limit_q8(of_pair) + 1, of_pair));
-  pair[SPREAD] = pad.spread_least_q20 + 255;
-  assert_limit(limit_q8(of_pair + (8 << 8)), of_pair);
 }
 
 /* How many frames a contact has after two of these readings, of a fit with these flags. */
@@ -492,7 +483,7 @@ TEST(test_parts_add_up_to_a_frame) {
       progress = fit_shapes_part(&array, &other, pressure_Pa_q10, &settings, &fit, &parts, &of_parts);
       count++;
     } while (progress == FIT_SHAPES_UNFINISHED);
-    TEST_ASSERT_EQUAL(i == 0 ? 2 : FIT_SHAPES_PARTS, count);
+    TEST_ASSERT_EQUAL(i == 0 ? 1 : FIT_SHAPES_PARTS, count);
     TEST_ASSERT_EQUAL(answers ? FIT_SHAPES_ANSWERED : FIT_SHAPES_STEPPED, progress);
     TEST_ASSERT_EQUAL_MEMORY(&state, &parts, sizeof parts);
     TEST_ASSERT_EQUAL_MEMORY(&result, &of_parts, sizeof of_parts);
