@@ -126,7 +126,7 @@ def pressed(player, kind, seed, commands):
         pull = ("--tangential", kind.pull) if kind.pull else ()
         touch = ("--indenter", kind.object, "--force", FORCES_N, "--margin", kind.margin_mm, *pull)
         player.write(path, kind.scenario, kind.pads.effects, seed, PRESSES_s, "--layer", kind.pads.layer_mm, *kind.pads.options, *touch)
-        thin = ("--prior-sigma", THIN_SIGMA_mm, "--prior-width", THIN_SD_mm)
+        thin = ("--set", f"prior={THIN_SIGMA_mm}:{THIN_SD_mm}")
         of_pad = ("--pad", kind.pads.layer_mm, "--first", first) if kind.pads.calibrated else thin
         player.play(path, recording, seed, "--osr", 256, *of_pad)
         return frames_of(path, recording, kind.beyond_mm)

@@ -132,7 +132,7 @@ class Workshop(TwinPlayer):
         margin = () if scenario.margin_mm is None else ("--margin", scenario.margin_mm)
         pressed = ("--indenter", scenario.indenter, "--layer", scenario.layer_mm, *margin, *scenario.options)
         self.write(path, scenario.kind, scenario.effects, seed, seconds, *pressed)
-        prior = ("--prior-sigma", self.prior_sigma_mm, "--prior-width", PRIOR_WIDTH_mm) if scenario.prior else ()
+        prior = ("--set", f"prior={self.prior_sigma_mm}:{PRIOR_WIDTH_mm}") if scenario.prior else ()
         first = () if scenario.calibrated is None else ("--first", self.sessions[scenario.session])
         self.play(path, recording, seed, "--rate", scenario.rate, "--noise", scenario.noise, *prior, *first)
         played = Played(path, recording, truth)

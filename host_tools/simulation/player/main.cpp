@@ -20,6 +20,7 @@ extern "C" {
 }
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
@@ -36,10 +37,10 @@ constexpr std::uint32_t CALIBRATED_s = 1767225600; // 2026-01-01: the same bytes
 
 struct PlayOptions {
   std::string scenario, recording, raw_bytes, commands, first, serial = "0000000000000001";
-  std::string osr = "1024", rate = "max", slip_threshold, slip_window;
+  std::string osr = "1024", rate = "max";
+  std::vector<std::string> settings;
   double noise = 1.0, seconds = 0.0;
   std::uint64_t seed = 1;
-  float prior_sigma_mm = 0.0F, prior_width_mm = 0.0F;
   std::optional<double> pad_mm;
   bool from_touch = false;
   bool raw = false, replace = false, quiet = false;
@@ -129,18 +130,12 @@ int calibrate(const CalibrateOptions &options) {
 
 int play(const PlayOptions &options) {
   // Everything that can be wrong is, before anything takes time.
+  std::vector<WantedSetting> more;
+  std::transform(options.settings.begin(), options.settings.end(), std::back_inserter(more), setting_from_text);
   std::vector<wire_packet> wanted;
-  const auto want = [&wanted](const std::vector<WantedSetting> &settings) { wanted.push_back(setting_commands(settings, {}).front()); };
-  want({setting_from_text("osr=" + options.osr)});
-  want({setting_from_text("rate=" + options.rate)});
-  if (!options.slip_threshold.empty() || !options.slip_window.empty()) {
-    if (options.slip_threshold.empty() || options.slip_window.empty()) {
-      throw Error("--slip-threshold and --slip-window belong together; give both");
-    }
-    want({setting_from_text("slip_threshold=" + options.slip_threshold), setting_from_text("slip_window=" + options.slip_window)});
-  }
-  if ((options.prior_sigma_mm > 0.0F) != (options.prior_width_mm > 0.0F)) {
-    throw Error("--prior-sigma and --prior-width belong together; give both");
+  for (const auto &settings : {std::vector{setting_from_text("osr=" + options.osr)}, {setting_from_text("rate=" + options.rate)}, more}) {
+    const std::vector<wire_packet> commands = setting_commands(settings, {});
+    wanted.insert(wanted.end(), commands.begin(), commands.end());
   }
   std::optional<pad_profile> pad;
   if (options.pad_mm) {
@@ -159,8 +154,6 @@ int play(const PlayOptions &options) {
   settings.seed = options.seed;
   settings.noise = options.noise;
   settings.prom_spread = 0.03;
-  settings.prior_sigma_mm = options.prior_sigma_mm;
-  settings.prior_width_mm = options.prior_width_mm;
   settings.world = {&scenario, pressure_Pa, temperature_degC};
   settings.pad = pad ? &*pad : nullptr;
   native_set_serial_number(options.serial.c_str());
@@ -370,10 +363,7 @@ int run(int argc, char **argv) {
   player->add_flag("--overwrite", given.replace, "Replace a recording that exists");
   option(player, "--osr", given.osr, "N", "Oversampling, 256 to 8192; default 1024");
   option(player, "--rate", given.rate, "HZ", "Frames a second, or max (default)");
-  option(player, "--slip-threshold", given.slip_threshold, "MM", "Slip distance");
-  option(player, "--slip-window", given.slip_window, "MS", "Its window");
-  option(player, "--prior-sigma", given.prior_sigma_mm, "MM", "Prior on sigma")->check(CLI::Range(0.1, 100.0));
-  option(player, "--prior-width", given.prior_width_mm, "MM", "Its standard deviation")->check(CLI::Range(0.001, 100.0));
+  option(player, "--set", given.settings, "NAME=VALUE", "One more setting, as of fingertip set")->allow_extra_args(false);
   CLI::Option *pad = option(player, "--pad", given.pad_mm, "MM", "Thickness of the pad: the firmware estimates tangential force");
   player->add_flag("--from-touch", given.from_touch, "As of fingertip pad")->needs(pad);
   option(player, "--first", given.first, "FILE", "Commands that it is sent first, of fingertip_player calibrate");

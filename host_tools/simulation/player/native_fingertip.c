@@ -38,10 +38,6 @@ bool native_fingertip_start(const struct native_fingertip_settings *settings) {
   native_set_event_source(bus_next_us, &array);
   port_set_event_handler(on_event, &app);
   app_start(&app, sim_array_bus(&array));
-  if (settings->prior_width_mm > 0.0f) {
-    app.stages.location.settings.prior_sigma_mm = settings->prior_sigma_mm;
-    app.stages.location.settings.prior_width_mm = settings->prior_width_mm;
-  }
 #if FT_WITH_TANGENTIAL
   if (settings->pad) {
     stages_use_profile(&app.stages, settings->pad);

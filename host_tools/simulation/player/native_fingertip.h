@@ -11,12 +11,10 @@
 #include <stdint.h>
 
 struct native_fingertip_settings {
-  uint64_t seed;        /* of noise and calibration */
-  double noise;         /* times the datasheet's */
-  double prom_spread;   /* every calibration word of every sensor is off the typical part's by up to
-                           this share; the firmware reads it and calculates with it */
-  float prior_sigma_mm; /* prior on the width; prior_width_mm 0: the build's own */
-  float prior_width_mm;
+  uint64_t seed;                 /* of noise and calibration */
+  double noise;                  /* times the datasheet's */
+  double prom_spread;            /* every calibration word of every sensor is off the typical part's by up to
+                                    this share; the firmware reads it and calculates with it */
   const struct pad_profile *pad; /* the profile in use, which outlives the fingertip; NULL: the stored one */
   struct sim_world world;
   sensor_map absent;    /* bitmap of the sensors that are not fitted */

@@ -112,9 +112,8 @@ class Player(unittest.TestCase):
     def test_wrong_options(self):
         for options, reason in (
             ("--osr 300", "256"),
-            ("--prior-sigma 3", "belong together"),
             ("--pad 3", "5 to 20 mm"),
-            ("--slip-window 50", "belong together"),
+            ("--set slip_window=5000", "1000"),
         ):
             self.assertIn(reason, self.refused("play", self.scenario, "-o", self.folder / "never.csv", *options.split()))
 

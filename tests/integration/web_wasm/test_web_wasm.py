@@ -77,7 +77,8 @@ class Parity(WebWasm):
         self.same(self.scenario("lift", "--seconds", "15"), pad=True)
 
     def test_a_slide_seldom_looked_at(self):
-        self.same(self.scenario("slide", "--seconds", "15"), "--rate", "50", "--slip-threshold", "0.5", "--slip-window", "100", least_Hz=50)
+        slip = ("--set", "slip_threshold=0.5", "--set", "slip_window=100")
+        self.same(self.scenario("slide", "--seconds", "15"), "--rate", "50", *slip, least_Hz=50)
 
     def test_a_difference_is_seen(self):
         whole = bytes(range(1, 200)) + b"\0" + bytes(range(1, 100)) + b"\0"
