@@ -41,18 +41,12 @@ template <typename Field> Column integer(const char *name, Field field, bool is_
           }};
 }
 
-// "-1": unknown, where the field may be.
-template <typename Field> Column flag(const char *name, Field field) {
-  return {name, true,
-          [=](const GripRow &row) {
-            const std::optional<bool> value = field(row);
-            return std::string(!value ? "-1" : *value ? "1" : "0");
-          },
-          [=](std::string_view cell, GripRow &row) {
-            using Value = std::remove_reference_t<decltype(field(row))>;
-            constexpr bool may_be_unknown = !std::is_same_v<Value, bool>;
-            field(row) = may_be_unknown && cell == "-1" ? Value() : Value(cell == "1");
-            return cell == "0" || cell == "1" || (may_be_unknown && cell == "-1");
+// "-1": unknown.
+Column object() {
+  return {"object", true, [](const GripRow &row) { return row.status->object ? std::to_string(*row.status->object) : "-1"; },
+          [](std::string_view cell, GripRow &row) {
+            row.status->object = cell == "-1" ? std::nullopt : std::optional(cell == "1");
+            return cell == "0" || cell == "1" || cell == "-1";
           }};
 }
 
@@ -74,9 +68,9 @@ const std::vector<Column> &columns() {
       word("state", FIELD(report.state), state_name, state_of_name),
       word("trouble", FIELD(report.trouble), trouble_names, trouble_of_names),
       number("width_mm", FIELD(status->width_mm), true),
-      flag("moving", FIELD(status->moving)),
-      flag("object", FIELD(status->object)),
-      flag("active", FIELD(status->active)),
+      integer("moving", FIELD(status->moving), true),
+      object(),
+      integer("active", FIELD(status->active), true),
       integer("fault", FIELD(status->fault), true),
       number("current_A", FIELD(status->current_A), true, true),
       integer("status_us", FIELD(status->host_us), true),

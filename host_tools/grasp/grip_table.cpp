@@ -3,16 +3,11 @@
 #include "grasp/gripper/gripper.hpp"
 #include "grasp/settings.hpp"
 #include "grasp/words.hpp"
+#include "libfingertip/text.hpp"
 
-#include <algorithm>
 #include <cstdio>
 
 using namespace fingertip;
-
-static std::string upper(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::toupper(c); });
-  return text;
-}
 
 static void print_settings() {
   std::printf("\n\n@dataclasses.dataclass(frozen=True)\nclass Settings:\n"

@@ -1,11 +1,9 @@
-// A gripper without a line, for tests of what stands above the seam: it moves at the speed it is
-// told, in the time that passes, and fails where the test says so.
+// A gripper without a line, for tests of what is above the seam: the ideal one, which fails where the test says so.
 #pragma once
 
-#include "grasp/gripper/gripper.hpp"
 #include "libfingertip/clock.hpp"
+#include "simulation/cell/gripper_motion.hpp"
 
-#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <mutex>
@@ -17,25 +15,20 @@ namespace test {
 // What outlives a gripper that is closed and opened again.
 class FakeGripperState {
 public:
-  std::atomic<bool> silent{false}, active{true}, unplugged{false}, was_left_alone{false};
+  std::atomic<bool> silent{false}, unplugged{false}, was_left_alone{false};
   std::atomic<int> fault{0}, activations{0}, opened{0}, exchanges{0}, delay_ms{0};
 
-  double width_mm() {
+  fingertip::GripperStatus status() {
     std::lock_guard lock(mutex_);
     advance();
-    return width_mm_;
+    return motion_.status();
   }
-  bool moving() {
-    std::lock_guard lock(mutex_);
-    advance();
-    return width_mm_ != target_mm_;
-  }
+  double width_mm() { return status().width_mm; }
   void move(const fingertip::GripperMove &move) {
     std::lock_guard lock(mutex_);
     advance();
     moves_.push_back(move);
-    target_mm_ = move.width_mm;
-    speed_mm_s_ = move.speed_mm_s;
+    motion_.move(move);
   }
   std::vector<fingertip::GripperMove> moves() {
     std::lock_guard lock(mutex_);
@@ -45,13 +38,12 @@ public:
 private:
   void advance() {
     const std::int64_t now_us = fingertip::steady_now_us();
-    const double way_mm = speed_mm_s_ * static_cast<double>(now_us - at_us_) / 1e6;
-    width_mm_ += std::clamp(target_mm_ - width_mm_, -way_mm, way_mm);
+    motion_.step(1e-6 * static_cast<double>(now_us - at_us_));
     at_us_ = now_us;
   }
 
   std::mutex mutex_;
-  double width_mm_ = 50.0, target_mm_ = 50.0, speed_mm_s_ = 0.0;
+  fingertip::GripperMotion motion_{fingertip::gripper_mechanics("ideal"), 50.0};
   std::int64_t at_us_ = fingertip::steady_now_us();
   std::vector<fingertip::GripperMove> moves_;
 };
@@ -63,22 +55,18 @@ public:
     state_->opened++;
   }
   const fingertip::GripperTraits &traits() const override {
-    static const fingertip::GripperTraits own = {{50.0, 0.05, 0.0, 1.0, 100.0, 0.0, 0.0, 0.01, 0.002}, "fake"};
+    static const fingertip::GripperTraits own = fingertip::gripper_mechanics("ideal").traits;
     return own;
   }
   std::string line() const override { return "no line"; }
   void activate() override {
     check();
     state_->activations++;
-    state_->active = true;
   }
   fingertip::GripperStatus poll() override {
     check();
-    fingertip::GripperStatus status;
+    fingertip::GripperStatus status = state_->status();
     status.host_us = fingertip::steady_now_us();
-    status.active = state_->active;
-    status.width_mm = state_->width_mm();
-    status.moving = state_->moving();
     status.fault = static_cast<std::uint8_t>(state_->fault.load());
     status.was_left_alone = state_->was_left_alone;
     return status;

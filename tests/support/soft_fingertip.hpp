@@ -45,8 +45,6 @@ public:
   const std::string &link() const { return link_; }
   // Before anybody asks for it.
   wire_info &info() { return info_.body.info; }
-  std::atomic<bool> frozen{false};  // frames, whose values never change
-  std::atomic<bool> stalled{false}; // no frames, but answers
   std::atomic<bool> refuses{false}; // to stream
 
   void unplug() {
@@ -111,15 +109,12 @@ private:
   }
 
   void send_frame() {
-    if (stalled) {
-      return;
-    }
     frame_++;
     const Feel feel = feel_();
     wire_packet packet = make_contact(0, now_us(), frame_);
     wire_contact &contact = packet.body.contact;
     const bool touches = feel.force_N > 0.02f;
-    const float noise = frozen ? 0 : 1e-3f * static_cast<float>(frame_ % 17);
+    const float noise = 1e-3f * static_cast<float>(frame_ % 17);
     contact.flags = CONTACT_FLAG_TARED | feel.flags;
     if (touches) {
       contact.flags |= CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TANGENTIAL_VALID;

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstring>
 #include <netdb.h>
-#include <poll.h>
 #include <sys/socket.h>
 
 namespace fingertip {
@@ -44,14 +43,10 @@ RobotiqUrcap::RobotiqUrcap(const GripperWay &given) : way_(complete_way(given)),
 }
 
 bool RobotiqUrcap::is_ready(short events, HostTime until) const {
-  for (;;) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - host_now());
-    pollfd one = {line_.get(), events, 0};
-    const int ready = ::poll(&one, 1, static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
-    if (ready >= 0 || errno != EINTR) {
-      return ready == 1;
-    }
+  pollfd one = {line_.get(), events, 0};
+  while (wait_for(&one, 1, until) == 0 && host_now() < until) { // a signal came
   }
+  return one.revents != 0;
 }
 
 HostTime RobotiqUrcap::until() const {

@@ -8,8 +8,10 @@
 #include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
 
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 
 namespace fingertip {
@@ -23,8 +25,6 @@ public:
   ServedPort(const ServedPort &) = delete;
   ServedPort &operator=(const ServedPort &) = delete;
 
-  /* Gives the link another name. Throws Error. */
-  void rename(const std::string &link);
   /* What to open: the link, or the port itself where there is none. */
   const std::string &path() const { return path_; }
   /* Waits until bytes come, or a program opens or closes the port. May return early. */
@@ -40,7 +40,7 @@ public:
   unsigned speed() const;
 
 private:
-  static Error failure(const std::string &what); /* with errno's text */
+  static Error failure(const std::string &what) { return Error(ErrorCode::cannot_open, what + " (" + std::strerror(errno) + ")"); }
   void look();
   void make_raw();
 

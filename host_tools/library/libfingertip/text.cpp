@@ -72,4 +72,11 @@ std::string hex(const std::vector<std::uint8_t> &bytes) {
   return text;
 }
 
+std::string upper(std::string text) {
+  for (char &c : text) {
+    c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+  }
+  return text;
+}
+
 } // namespace fingertip

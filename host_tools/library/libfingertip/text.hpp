@@ -24,6 +24,7 @@ std::optional<std::int64_t> to_i64(std::string_view text);
 /* Empty parts are kept: "a,,b" has three. */
 std::vector<std::string_view> split(std::string_view text, char separator);
 std::string_view trim(std::string_view text);
+std::string upper(std::string text); /* of ASCII */
 /* The first for which is_it holds, else nullptr. */
 template <typename Range, typename IsIt> auto find_in(Range &range, const IsIt &is_it) -> decltype(&*std::begin(range)) {
   for (auto &each : range) {

@@ -61,6 +61,10 @@ def quantile(values, share):
     return None if value == float("inf") else round(value, 3)
 
 
+def words(rows, key):
+    return sorted({word for row in rows for word in row[key].split()})
+
+
 def percent(part, whole):
     return round(100 * part / whole, 3) if whole else None
 
@@ -133,17 +137,13 @@ def summary_of_held(each):
         "opened_percent": percent(sum(not one["early"] for one in released), len(held)),
         "opened_early": sum(one["early"] for one in released),
         "dropped": sum(one["dropped"] and not one["released"] for one in held),
-        "reported": sorted({word for one in held for word in one["reported"].split()}),
+        "reported": words(held, "reported"),
     }
 
 
 def worst(key, name=None):
     """Of rows of ours with this name, or of all."""
-
-    def found(ours, _sets, _wrong):
-        return max((row[key] for row in ours if name in (None, row["row"]) and row[key] is not None), default=None)
-
-    return found
+    return lambda ours, sets, wrong: max((row[key] for row in ours if name in (None, row["row"]) and row[key] is not None), default=None)
 
 
 # figure: its limits, by gripper, and its name in the rows BASE
@@ -208,8 +208,7 @@ def caught(each):
         for slide in one["catches"]
         if slide["way_mm"] >= 1 and slide["begin_s"] > one["lift_s"] and (slide["reaction_ms"] or 100) < 100
     )
-    _, number, begin_s = slides[len(slides) // 2] if slides else (0, None, None)
-    return number, begin_s
+    return slides[len(slides) // 2][1:] if slides else (None, None)
 
 
 def measure(options, steps):

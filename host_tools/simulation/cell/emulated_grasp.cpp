@@ -9,9 +9,8 @@
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/names.hpp"
 #include "library/pad/profile.hpp"
-#include "simulation/cell/calibrated.hpp"
 #include "simulation/cell/fingertip_cell_world.hpp"
-#include "simulation/cell/gripper_line.hpp"
+#include "simulation/cell/gripper_motion.hpp"
 #include "simulation/cell/kind_trial.hpp"
 
 extern "C" {
@@ -154,9 +153,8 @@ public:
   // All must outlive it.
   EmulatedGrasp(const KindOfGrasp &grasp, const GripperMechanics &gripper, const Face &face, const pad_profile &profile)
       : grasp_(grasp), gripper_(gripper, grasp.width_mm + grasp.opens_mm, Random(SEED, LINE, 0)),
-        world_({grasp, std::nullopt, {}, std::nullopt}, face, gripper_.motion()), fingers_{
-                                                                                      EmulatedFingertip(profile, Random(SEED, PAD, 0)),
-                                                                                      EmulatedFingertip(profile, Random(SEED, PAD, 1))} {}
+        world_({grasp, false, {}, std::nullopt}, face, gripper_.motion()), fingers_{EmulatedFingertip(profile, Random(SEED, PAD, 0)),
+                                                                                    EmulatedFingertip(profile, Random(SEED, PAD, 1))} {}
 
   // What a board sent at this time, since the last run().
   void take(std::size_t finger, const Bytes &bytes, double arrived_s) {
@@ -190,11 +188,8 @@ public:
         line_.pop_front();
       }
       if (gripper_.next_s() <= t_s_) {
-        const double width_mm = gripper_.sent().width_mm;
         line_.push_back(gripper_.exchange(command_));
-        if (gripper_.sent().width_mm != width_mm) {
-          asked_.push_back({t_s_, gripper_.sent().width_mm});
-        }
+        note();
       }
     }
   }
@@ -222,16 +217,22 @@ private:
     double arrived_s, measured_s;
     bool slides;
   };
-  struct Change {
-    double at_s, width_mm;
+  // Commanded, sent, and of the fingers.
+  struct Widths {
+    double at_s;
+    std::array<double, 3> mm;
   };
 
-  void step_controller() {
-    const double width_mm = command_.width_mm;
-    report_ = controller_->step(t_s_, command_);
-    if (command_.width_mm != width_mm) {
-      commanded_.push_back({t_s_, command_.width_mm});
+  void note() {
+    const std::array<double, 3> now_mm = {command_.width_mm, gripper_.sent().width_mm, gripper_.motion().width_mm()};
+    if (widths_.empty() || widths_.back().mm != now_mm) {
+      widths_.push_back({t_s_, now_mm});
     }
+  }
+
+  void step_controller() {
+    report_ = controller_->step(t_s_, command_);
+    note();
     if (report_.state == GRIP_HOLDING || report_.state == GRIP_SLIPPING) {
       trouble_ |= report_.trouble;
       holds_s_ = std::min(holds_s_, t_s_);
@@ -245,12 +246,9 @@ private:
     if (t_s_ >= holds_s_ + grasp_.waits_s && world_.lift()) {
       lift_s_ = t_s_;
     }
-    const double width_mm = gripper_.motion().width_mm();
     world_.advance(to_s - t_s_);
     t_s_ = to_s;
-    if (gripper_.motion().width_mm() != width_mm) {
-      moved_.push_back({t_s_, gripper_.motion().width_mm()});
-    }
+    note();
     over_ = world_.is_dropped() || t_s_ - lift_s_ >= grasp_.ends_s;
   }
 
@@ -259,13 +257,11 @@ private:
                                     [&](const Report &report) { return report.slides && report.arrived_s >= slip.begin_s; });
     const bool is_reported = first != reports_.end();
     // The first step that closes further than the width before it.
-    const auto closed = [&](const std::vector<Change> &changes) {
-      double width_mm = NEVER_s;
-      for (const Change &change : changes) {
-        if (change.at_s >= slip.begin_s && change.width_mm < width_mm) {
-          return change.at_s - slip.begin_s;
+    const auto closed = [&](std::size_t which) {
+      for (std::size_t i = 1; i < widths_.size(); i++) {
+        if (widths_[i].at_s >= slip.begin_s && widths_[i].mm[which] < widths_[i - 1].mm[which]) {
+          return widths_[i].at_s - slip.begin_s;
         }
-        width_mm = change.width_mm;
       }
       return NEVER_s;
     };
@@ -274,9 +270,9 @@ private:
             {"way_mm", slip.way_mm},
             {"measured_ms", in_ms(is_reported ? first->measured_s - slip.begin_s : NEVER_s)},
             {"sent_ms", in_ms(is_reported ? first->arrived_s - slip.begin_s : NEVER_s)},
-            {"answered_ms", in_ms(closed(commanded_))},
-            {"asked_ms", in_ms(closed(asked_))},
-            {"moved_ms", in_ms(closed(moved_))},
+            {"answered_ms", in_ms(closed(0))},
+            {"asked_ms", in_ms(closed(1))},
+            {"moved_ms", in_ms(closed(2))},
             {"reaction_ms", in_ms(slip.reaction_s.value_or(NEVER_s))}};
   }
 
@@ -293,7 +289,7 @@ private:
   bool over_ = false;
   std::array<std::size_t, 2> frames_{}, loads_{}; // since both are ready
   std::vector<Report> reports_;
-  std::vector<Change> commanded_, asked_, moved_;
+  std::vector<Widths> widths_;
 };
 
 void read_whole(void *to, std::size_t length) {

@@ -39,46 +39,42 @@ std::optional<GripTouch> Faults::frame(std::size_t finger, GripTouch touch) {
     return touch;
   }
   const bool contact = (touch.flags & CONTACT_FLAG_CONTACT) != 0;
-  const bool boots = fault_.kind == Kind::reboot && touch.t_s < begins_s_ + BOOTS_s;
-  if (fault_.kind == Kind::gone || boots) {
-    return std::nullopt;
-  }
-  if (fault_.kind == Kind::nothing) {
-    return less_by(touch, touch.force_N, 0.0, 0.0);
-  }
-  if (fault_.kind == Kind::tared || fault_.kind == Kind::reboot) {
+  switch (fault_.kind) {
+  case Kind::gone: return std::nullopt;
+  case Kind::nothing: return less_by(touch, touch.force_N, 0.0, 0.0);
+  case Kind::weak: return less_by(touch, LESS * touch.force_N, LESS * touch.qx_N, LESS * touch.qy_N);
+  case Kind::moved_zero: return less_by(touch, MOVED_N, 0.0, 0.0);
+  case Kind::spike: return less_by(touch, -SPIKE_N, 0.0, -SPIKE_N);
+  case Kind::reboot:
+  case Kind::tared:
+    if (fault_.kind == Kind::reboot && touch.t_s < begins_s_ + BOOTS_s) {
+      return std::nullopt;
+    }
     zero_[finger] = zero_[finger].value_or(touch);
     return less_by(touch, zero_[finger]->force_N, zero_[finger]->qx_N, zero_[finger]->qy_N);
-  }
-  if (fault_.kind == Kind::weak) {
-    return less_by(touch, LESS * touch.force_N, LESS * touch.qx_N, LESS * touch.qy_N);
-  }
-  if (fault_.kind == Kind::moved_zero) {
-    return less_by(touch, MOVED_N, 0.0, 0.0);
-  }
-  if (fault_.kind == Kind::spike) {
-    return less_by(touch, -SPIKE_N, 0.0, -SPIKE_N);
-  }
-  if (fault_.kind == Kind::frozen) {
+  case Kind::frozen: {
     GripTouch frozen = last_[finger].value_or(touch);
     frozen.t_s = touch.t_s;
     last_[finger] = frozen;
     return frozen;
   }
-  if (fault_.kind == Kind::uncertain && contact) {
-    const double force_N = touch.force_N;
-    touch.flags |= CONTACT_FLAG_UNCERTAIN;
-    touch.x_mm = random_.uniform(-WRONG_mm, WRONG_mm);
-    touch.y_mm = random_.uniform(-WRONG_mm, WRONG_mm);
-    touch.qx_N = random_.uniform(-force_N, force_N);
-    touch.qy_N = random_.uniform(-force_N, force_N);
-    touch.force_N /= fault_.fingers[0] != fault_.fingers[1] ? 2 : 1;
+  case Kind::uncertain:
+    if (contact) {
+      const double force_N = touch.force_N;
+      touch.flags |= CONTACT_FLAG_UNCERTAIN;
+      touch.x_mm = random_.uniform(-WRONG_mm, WRONG_mm);
+      touch.y_mm = random_.uniform(-WRONG_mm, WRONG_mm);
+      touch.qx_N = random_.uniform(-force_N, force_N);
+      touch.qy_N = random_.uniform(-force_N, force_N);
+      touch.force_N /= fault_.fingers[0] != fault_.fingers[1] ? 2 : 1;
+    }
+    return touch;
+  case Kind::saturated:
+    touch.flags |= contact ? CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND : 0;
+    touch.force_N /= contact ? 2 : 1;
+    return touch;
+  default: return touch;
   }
-  if (fault_.kind == Kind::saturated && contact) {
-    touch.flags |= CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND;
-    touch.force_N /= 2;
-  }
-  return touch;
 }
 
 Faults::Line Faults::line(double t_s) {

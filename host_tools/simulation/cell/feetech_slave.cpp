@@ -20,7 +20,12 @@ class FeetechSlave : public GripperServer::Slave {
 public:
   FeetechSlave(GripperMotion &motion, const GripperWay &complete)
       : motion_(motion), jaw_(complete), id_(static_cast<std::uint8_t>(complete.slave)) {
+    const bool is_active = motion.active();
     FeetechSlave::lose_power();
+    if (is_active) {
+      memory_[TORQUE_ENABLE] = 1;
+      motion.activate();
+    }
   }
 
   double baud() const override { return BAUD; }

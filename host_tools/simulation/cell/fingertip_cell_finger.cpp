@@ -7,7 +7,6 @@
 #include "libfingertip/served_port.hpp"
 #include "libfingertip/session.hpp"
 #include "library/pad/profile.hpp"
-#include "simulation/cell/calibrated.hpp"
 #include "simulation/player/native_fingertip.h"
 #include "tool/advice.hpp"
 
@@ -86,16 +85,11 @@ private:
     native_cdc_open();
     run_device_to(SETTLED_us);
     if (finger_.calibrated_sd) {
-      calibrate(*finger_.calibrated_sd);
+      Random random(finger_.seed, CALIBRATION, 0);
+      order(command_calibrate(calibrated(finger_.gain, *finger_.calibrated_sd, 1.0, pad_, random), geometry.sensor_count));
     }
     order(command_pad(pad_));
     native_cdc_close();
-  }
-
-  void calibrate(double sd) {
-    Random random(finger_.seed, CALIBRATION, 0);
-    const calibration stored = calibrated(finger_.gain, sd, 1.0, pad_, random);
-    order(command_calibrate(stored, geometry.sensor_count));
   }
 
   void order(const wire_packet &command) {

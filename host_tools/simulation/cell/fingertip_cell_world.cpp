@@ -11,6 +11,7 @@ namespace {
 
 constexpr double STEP_s = 2.5e-4;                    // between two samples of the gripper
 constexpr double STEADY = 0.1, STEADY_LEAST_N = 0.2; // a force that changes by this share at most is steady
+constexpr double STEADY_s = 1.0;                     // then it is lifted
 constexpr double LOST_N = 0.01;
 
 struct Known {
@@ -24,22 +25,18 @@ constexpr Known KNOWN[] = {{Event::Kind::pour, 0.0, 5.0, 1.0},
                            {Event::Kind::slick, 0.0, 0.95, 0.5},
                            {Event::Kind::lower, 0.2, 10.0, 0.0}};
 
-Event event_of(Event::Kind kind, double begin_s, double amount) {
-  const auto known = std::find_if(std::begin(KNOWN), std::end(KNOWN), [&](const Known &one) { return one.kind == kind; });
-  return {kind, begin_s, known->seconds > 0.0 ? known->seconds : amount, amount};
-}
-
 KindOfGrasp grasp_of(const World::Options &options) {
   KindOfGrasp grasp = options.grasp;
-  for (const Planned &one : options.planned) {
-    grasp.events.push_back(event_of(one.kind, grasp.lift_s + one.after_s, one.amount));
+  for (Event event : options.planned) {
+    event.begin_s += grasp.lift_s;
+    grasp.events.push_back(event);
   }
   return grasp;
 }
 
 } // namespace
 
-Planned planned(const std::string &text) {
+Event planned(const std::string &text) {
   const std::size_t colon = text.find(':'), at = text.find('@');
   if (colon != std::string::npos) {
     const std::string name = text.substr(0, colon);
@@ -47,7 +44,7 @@ Planned planned(const std::string &text) {
     const auto after_s = at == std::string::npos ? 0.0 : to_double(std::string_view(text).substr(at + 1));
     const Known *known = find_in(KNOWN, [&](const Known &one) { return name == name_of(one.kind); });
     if (known && amount && *amount >= known->low && *amount <= known->high && after_s && *after_s >= 0.0 && *after_s <= 1e6) {
-      return {known->kind, *amount, *after_s};
+      return {known->kind, *after_s, known->seconds > 0.0 ? known->seconds : *amount, *amount};
     }
   }
   throw Error(ErrorCode::bad_value, "\"" + text +
@@ -75,11 +72,12 @@ bool World::lift() {
   return true;
 }
 
-bool World::disturb(Event::Kind kind, double amount) {
+bool World::disturb(Event event) {
   if (since_lift_s() < grasp_.lift_s || !is_there_) {
     return false;
   }
-  grasp_.events.push_back(event_of(kind, since_lift_s(), amount));
+  event.begin_s = since_lift_s();
+  grasp_.events.push_back(event);
   return true;
 }
 
@@ -103,12 +101,12 @@ void World::watch_force() {
     is_crushed_ = true;
     events_.push_back("crushed");
   }
-  if (lift_s_ || !options_.lift_after_s) {
+  if (lift_s_ || !options_.lifts_by_itself) {
     return;
   }
   if (!steady_ || force_N < STEADY_LEAST_N || std::abs(force_N - steady_->force_N) > STEADY * steady_->force_N) {
     steady_ = {time_s_, force_N};
-  } else if (time_s_ - steady_->since_s >= *options_.lift_after_s) {
+  } else if (time_s_ - steady_->since_s >= STEADY_s) {
     lift();
   }
 }

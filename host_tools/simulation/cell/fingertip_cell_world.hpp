@@ -16,20 +16,16 @@
 
 namespace fingertip::cell {
 
-// "slick:0.35" or "slick:0.35@1.5": of what size, how long after the lift's end. Throws Error, bad_value.
-struct Planned {
-  Event::Kind kind;
-  double amount, after_s;
-};
-Planned planned(const std::string &text);
+// "slick:0.35" or "slick:0.35@1.5": of what size, and begin_s how long after the lift's end. Throws Error, bad_value.
+Event planned(const std::string &text);
 bool is_disturbance(const std::string &name);
 
 class World {
 public:
   struct Options {
-    KindOfGrasp grasp;                        // with the lift and the events
-    std::optional<double> lift_after_s = 1.0; // none: only by a command
-    std::vector<Planned> planned;
+    KindOfGrasp grasp;           // with the lift and the events
+    bool lifts_by_itself = true; // once the force is steady; else by a command
+    std::vector<Event> planned;
     std::optional<Kind> kind; // whose course it is
   };
 
@@ -42,7 +38,7 @@ public:
   // False: it has been.
   bool lift();
   // Now; false: before the lift, or the object is gone.
-  bool disturb(Event::Kind kind, double amount);
+  bool disturb(Event event);
   void take_away() { is_there_ = false; }
 
   Pressures pressures_Pa(std::size_t finger) const { return is_there_ ? face_.base_Pa(cell_.patch(finger)) : Pressures{}; }

@@ -21,9 +21,9 @@ GripperMechanics gripper_mechanics(const std::string &model) {
   return {traits, is_servo ? SERVO_BACKLASH_mm : 0.0, is_servo ? 0.0 : ROBOTIQ_ACTIVATION_s};
 }
 
-GripperMotion::GripperMotion(const GripperMechanics &mechanics)
-    : mechanics_(mechanics), phase_(Phase::off), drive_mm_(mechanics.traits.stroke_mm), fingers_mm_(drive_mm_), target_mm_(drive_mm_),
-      speed_mm_s_(mechanics.traits.speed_max_mm_s), force_N_(mechanics.traits.force_max_N) {}
+GripperMotion::GripperMotion(const GripperMechanics &mechanics, std::optional<double> active_mm)
+    : mechanics_(mechanics), phase_(active_mm ? Phase::active : Phase::off), drive_mm_(active_mm.value_or(mechanics.traits.stroke_mm)),
+      fingers_mm_(drive_mm_), target_mm_(drive_mm_), speed_mm_s_(mechanics.traits.speed_max_mm_s), force_N_(mechanics.traits.force_max_N) {}
 
 double GripperMotion::nearest_step_mm(double width_mm) const {
   const GripperTraits &traits = mechanics_.traits;
@@ -166,6 +166,38 @@ GripperStatus GripperMotion::status() const {
   status.object = status.moving ? std::nullopt : std::optional(blocked_ != 0);
   status.width_mm = reported_width_mm();
   return status;
+}
+
+GripperLine::GripperLine(const GripperMechanics &mechanics, double width_mm, Random random)
+    : motion_(mechanics), next_s_(random.uniform(0.0, mechanics.traits.poll_s)) {
+  constexpr double STEP_s = 0.01, LONGEST_s = 30.0;
+  motion_.activate();
+  while (!motion_.active() && motion_.time_s() < LONGEST_s) {
+    motion_.step(STEP_s);
+  }
+  GripperMove move;
+  move.width_mm = width_mm;
+  move.speed_mm_s = mechanics.traits.speed_max_mm_s;
+  motion_.move(move);
+  motion_.step(mechanics.traits.latency_s + STEP_s);
+  while (motion_.moving() && motion_.time_s() < LONGEST_s) {
+    motion_.step(STEP_s);
+  }
+}
+
+GripperLine::Answer GripperLine::exchange(const GripCommand &command) {
+  const double t_s = next_s_, poll_s = motion_.mechanics().traits.poll_s;
+  if (command.motion == GRIP_ACTIVATE && sent_.motion != GRIP_ACTIVATE) {
+    motion_.activate();
+    sent_ = command;
+  } else if (command.motion == GRIP_MOVE && (command.width_mm != sent_.width_mm || command.speed_mm_s != sent_.speed_mm_s)) {
+    motion_.move(command);
+    sent_ = command;
+  }
+  next_s_ += poll_s;
+  GripperStatus status = motion_.status();
+  status.host_us = std::llround(1e6 * t_s);
+  return {t_s + 0.5 * poll_s, status};
 }
 
 } // namespace fingertip

@@ -14,7 +14,8 @@
 // a servo would yield. Latencies and the servo's backlash are assumptions, no measurements.
 #pragma once
 
-#include "grasp/gripper/gripper.hpp"
+#include "grasp/control/grip.hpp"
+#include "libfingertip/random.hpp"
 
 #include <deque>
 #include <functional>
@@ -34,8 +35,8 @@ GripperMechanics gripper_mechanics(const std::string &model);
 
 class GripperMotion {
 public:
-  // Not active yet; the fingers are open.
-  explicit GripperMotion(const GripperMechanics &mechanics);
+  // Active, the fingers at this width; none: not active yet, and open.
+  explicit GripperMotion(const GripperMechanics &mechanics, std::optional<double> active_mm = {});
 
   // Whether what is between the fingers pushes back with at least force_N at this width; below 0: what is around them, while they open.
   // Asked with widths that the fingers are about to take, and for backlash with the least force; must be true for all narrower widths if it
@@ -97,6 +98,31 @@ private:
   double target_mm_, speed_mm_s_, force_N_;
   bool moving_ = false;
   int blocked_ = 0;
+};
+
+// A simulated gripper at its line: once every poll_s a command goes out, if it is new, and what
+// the gripper's state at that time arrives half of that time later.
+class GripperLine {
+public:
+  // At the start it is activated and has this width. random: when the first exchange is.
+  GripperLine(const GripperMechanics &mechanics, double width_mm, Random random);
+
+  GripperMotion &motion() { return motion_; }
+  const GripperMotion &motion() const { return motion_; }
+  double next_s() const { return next_s_; } // of the exchange
+  struct Answer {
+    double known_s;
+    GripperStatus status;
+  };
+  // At next_s, to where motion() has been brought.
+  Answer exchange(const GripCommand &command);
+  // The last move that went out.
+  const GripCommand &sent() const { return sent_; }
+
+private:
+  GripperMotion motion_;
+  GripCommand sent_{};
+  double next_s_;
 };
 
 } // namespace fingertip

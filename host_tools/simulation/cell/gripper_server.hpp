@@ -55,14 +55,12 @@ public:
   // gripper_mechanics for a motion behind registers, which are its steps.
   static GripperMechanics mechanics(const std::string &model);
 
-  // motion outlives it. Throws Error: an unknown model; no port to be had.
+  // motion outlives it; a gripper whose motion is active has been activated. Throws Error: an unknown model; no port to be had.
   GripperServer(GripperMotion &motion, const Options &options);
   GripperServer(const GripperServer &) = delete;
   GripperServer &operator=(const GripperServer &) = delete;
 
   const std::string &port() const { return port_.path(); }
-  // Its link gets another name.
-  void rename(const std::string &link) { port_.rename(link); }
 
   // Waits at most this long for something to do, and does it.
   void step(std::chrono::microseconds longest_wait);

@@ -32,27 +32,19 @@ std::string HandServer::obey(int client, const std::string &line) {
   words >> verb >> side;
   const auto known = std::find(SIDES.begin(), SIDES.begin() + std::ptrdiff_t(fingertips_), side);
   const auto finger = static_cast<std::size_t>(known - SIDES.begin());
-  std::array<double, 3> values{};
-  std::string word;
-  bool are_numbers = true;
-  for (double &value : values) {
-    const auto number = verb == "press" && words >> word ? to_double(word) : std::nullopt;
-    are_numbers = are_numbers && number;
-    value = number.value_or(0.0);
-  }
-  const bool is_press = verb == "press" && are_numbers && values[2] >= 0.0;
+  HandAt hand;
+  const bool is_press = verb == "press" && words >> hand.x_mm >> hand.y_mm >> hand.force_N && hand.force_N >= 0.0;
   if (finger == fingertips_ || (!is_press && verb != "lift") || words >> rest) {
     return "give press SIDE X_mm Y_mm FORCE_N or lift SIDE; SIDE is left" + std::string(fingertips_ > 1 ? " or right" : "");
   }
   if (!obeys_) {
     return "no hand presses here; start fingertip simulate --mouse";
   }
+  hands_[finger] = {};
   if (is_press) {
-    hands_[finger] = {HandAt{std::clamp(values[0], -FARTHEST_mm, FARTHEST_mm), std::clamp(values[1], -FARTHEST_mm, FARTHEST_mm),
-                             std::min(values[2], MOST_N)},
+    hands_[finger] = {HandAt{std::clamp(hand.x_mm, -FARTHEST_mm, FARTHEST_mm), std::clamp(hand.y_mm, -FARTHEST_mm, FARTHEST_mm),
+                             std::min(hand.force_N, MOST_N)},
                       client};
-  } else {
-    hands_[finger] = {};
   }
   return "";
 }

@@ -3,9 +3,8 @@
 #include "grasp/fingertip.hpp"
 #include "libfingertip/random.hpp"
 #include "library/pad/profile.hpp"
-#include "simulation/cell/calibrated.hpp"
 #include "simulation/cell/cell.hpp"
-#include "simulation/cell/gripper_line.hpp"
+#include "simulation/cell/gripper_motion.hpp"
 #include "simulation/player/native_stages.h"
 #include "simulation/twin/effects.hpp"
 

@@ -1,14 +1,12 @@
-#include "simulation/cell/lift.hpp"
-
 #include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 #include "simulation/cell/gripper_server.hpp"
 #include "simulation/cell/hand_server.hpp"
+#include "simulation/cell/simulations.hpp"
 #include "tool/advice.hpp"
 
-#include <atomic>
 #include <cstdio>
 #include <poll.h>
 #include <sstream>
@@ -22,6 +20,7 @@ constexpr std::chrono::microseconds ROUND{1000};
 constexpr std::int64_t LONGEST_ROUND_us = 10'000; // of the world's time
 constexpr std::int64_t LATE_us = 30'000;          // the world waits for what is later than that
 constexpr std::size_t FINGERS = 2;
+constexpr double GAIN_ERROR = 0.01; // that calibration left of the gains
 
 // Lines of standard input, as long as it may be read.
 class Lines {
@@ -52,46 +51,14 @@ private:
   bool ended_ = false;
 };
 
-// A gripper on its own line, activated and as far open as it is to begin with.
-void open_gripper(GripperServer &server, GripperMotion &motion, const std::string &model, double width_mm) {
-  constexpr double HURRY_s = 0.02; // in a round: too short to notice
-  std::atomic<bool> is_done{false};
-  std::string why;
-  Thread client([&] {
-    try {
-      const auto gripper =
-          fingertip::open_gripper({.model = model, .port = server.port(), .timeout_s = 10.0}); // however busy this machine is
-      gripper->activate();
-      while (!gripper->poll().active) {
-      }
-      gripper->move({.width_mm = width_mm, .speed_mm_s = gripper->traits().speed_max_mm_s});
-      while (gripper->poll().moving) {
-      }
-    } catch (const Error &error) {
-      why = error.what();
-    }
-    is_done = true;
-  });
-  while (!is_done) {
-    server.step(ROUND);
-    motion.step(HURRY_s);
-  }
-  client.join();
-  if (!why.empty()) {
-    throw Error("the gripper does not open (" + why + ")");
-  }
-}
-
 class Lift {
 public:
   Lift(const LiftOptions &options, const Place &place)
-      : options_(options), place_(place), face_(options.face, LAYER_mm, options.cache),
-        fingers_(place, place.fingers(FINGERS, options.seed, options.gain_spread.value_or(0.05), false, options.gain_sd)),
-        motion_(GripperServer::mechanics(options.model)),
-        server_(motion_, {.model = options.model, .link = place.port(".gripper"), .real_time = false}) { // the link until all is ready
+      : options_(options), place_(place), face_(LIFT_FACE, LAYER_mm, options.cache),
+        fingers_(place, place.fingers(FINGERS, options.seed, options.gain_spread.value_or(0.05), false, GAIN_ERROR)),
+        motion_(GripperServer::mechanics(options.model), options.world.grasp.width_mm + options.opens_mm),
+        server_(motion_, {.model = options.model, .link = place.port("gripper"), .real_time = false}) {
     fingers_.wait_until_ready();
-    open_gripper(server_, motion_, options.model, options.world.grasp.width_mm + options.opens_mm);
-    server_.rename(place.port("gripper"));
     world_.emplace(options.world, face_, motion_);
     if (place.is_shared()) {
       server_of_truth_.emplace(place, FINGERS, false);
@@ -120,7 +87,7 @@ private:
   std::string head() const {
     const KindOfGrasp &grasp = options_.world.grasp;
     std::ostringstream text;
-    text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: " << options_.model << "\n# face: " << options_.face
+    text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: " << options_.model << "\n# face: " << LIFT_FACE
          << "\n# kind: " << (options_.world.kind ? name_of(*options_.world.kind) : "none") << "\n# shape: " << name_of(grasp.shape)
          << "\n# width_mm: " << grasp.width_mm << "\n# mass_kg: " << grasp.mass_kg << "\n# friction: " << grasp.pads[0].friction << ", "
          << grasp.pads[1].friction << "\n# crushes_N: " << grasp.crushes_N << "\n# seed: " << options_.seed << "\n";
@@ -218,8 +185,7 @@ private:
       return world_->lift();
     }
     if (is_disturbance(verb)) {
-      const Planned now = planned(verb + ":" + what);
-      return world_->disturb(now.kind, now.amount);
+      return world_->disturb(planned(verb + ":" + what));
     }
     if (verb == "take") {
       world_->take_away();

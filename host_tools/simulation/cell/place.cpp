@@ -7,7 +7,6 @@
 #include "libfingertip/session.hpp"
 #include "libfingertip/share_socket.hpp"
 #include "libfingertip/text.hpp"
-#include "tool/advice.hpp"
 
 #include <algorithm>
 #include <cerrno>
@@ -20,7 +19,6 @@
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <utility>
 
 namespace fingertip::cell {
 
@@ -30,7 +28,6 @@ constexpr const char *SERIALS[SIDES.size()] = {"00000000000CE110", "00000000000C
 enum Stream : std::uint64_t { GAINS = 851 };
 constexpr std::chrono::milliseconds LOOK_INTERVAL{10};
 constexpr std::int64_t ROW_us = 2'000;
-constexpr std::size_t ROWS_BYTES = 4096;
 
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -118,7 +115,7 @@ void Fingers::wait_until_ready() {
   for (std::size_t i = 0; server_ && i < count(); i++) {
     server_->add({fingers_[i].serial, fingers_[i].link, false});
     const std::string socket = own_share_folder() + "/" + share_socket_name(fingers_[i].serial);
-    while (!fs::exists(socket)) {
+    while (!SocketTransport::is_served(socket)) { // a killed simulation may have left one
       goes_on();
       server_->step(LOOK_INTERVAL);
     }
@@ -159,40 +156,24 @@ void Fingers::forget(std::size_t finger) {
 Truth::Truth(const std::string &path, bool overwrite, const std::string &head) {
   if (!path.empty()) {
     file_.emplace(path, overwrite, OutputFile::Appears::at_once);
-    rows_ = head;
-    flush();
-  }
-}
-
-Truth::~Truth() {
-  try {
-    flush();
-  } catch (const Error &error) {
-    print_error("fingertip", error);
+    put(head);
   }
 }
 
 void Truth::row(std::int64_t host_us, const std::string &cells) {
-  if (file_ && host_us - written_us_ >= ROW_us) {
+  if (host_us - written_us_ >= ROW_us) {
     written_us_ = host_us;
-    rows_ += std::to_string(host_us) + "," + cells + "\n";
-    if (rows_.size() > ROWS_BYTES) {
-      flush();
-    }
+    put(std::to_string(host_us) + "," + cells + "\n");
   }
 }
 
 void Truth::event(std::int64_t host_us, const std::string &text) {
-  if (file_) {
-    rows_ += "# event: " + std::to_string(host_us) + "," + printable(text) + "\n";
-    flush();
-  }
+  put("# event: " + std::to_string(host_us) + "," + printable(text) + "\n");
 }
 
-void Truth::flush() {
-  if (file_ && !rows_.empty()) {
-    const std::string rows = std::exchange(rows_, {});
-    file_->append(rows.data(), rows.size());
+void Truth::put(const std::string &lines) {
+  if (file_) {
+    file_->append(lines.data(), lines.size());
   }
 }
 

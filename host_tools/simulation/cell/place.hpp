@@ -97,19 +97,15 @@ class Truth {
 public:
   // path empty: it is not kept. head: comments and the names of the columns after the first.
   Truth(const std::string &path, bool overwrite, const std::string &head);
-  ~Truth();
-  Truth(const Truth &) = delete;
-  Truth &operator=(const Truth &) = delete;
 
   // Every 2 ms at most.
   void row(std::int64_t host_us, const std::string &cells);
   void event(std::int64_t host_us, const std::string &text);
 
 private:
-  void flush();
+  void put(const std::string &lines);
 
   std::optional<OutputFile> file_;
-  std::string rows_;
   std::int64_t written_us_ = 0;
 };
 

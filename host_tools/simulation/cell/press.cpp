@@ -1,11 +1,10 @@
-#include "simulation/cell/press.hpp"
-
 #include "libfingertip/clock.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/random.hpp"
 #include "libfingertip/session.hpp"
 #include "libfingertip/text.hpp"
 #include "simulation/cell/hand_server.hpp"
+#include "simulation/cell/simulations.hpp"
 #include "simulation/twin/effects.hpp"
 #include "simulation/twin/scenarios.hpp"
 
@@ -104,19 +103,17 @@ private:
 std::string head_of(const PressOptions &options, const std::vector<FingerProcess> &fingers) {
   std::ostringstream text;
   text << "# simulated: the truth of presses; time_us is CLOCK_MONOTONIC\n# weight_g: " << options.weight_g << "\n# seed: " << options.seed;
+  std::string columns = "\ntime_us";
   for (std::size_t i = 0; i < fingers.size(); i++) {
     text << "\n# gain_" << SIDES[i] << ":";
     for (std::size_t k = 0; k < SENSORS; k++) {
       text << " " << fingers[i].gain[k];
     }
-  }
-  text << "\ntime_us";
-  for (std::size_t i = 0; i < fingers.size(); i++) {
     for (const char *column : {"x_mm", "y_mm", "force_N"}) {
-      text << "," << SIDES[i] << "_" << column;
+      columns += std::string(",") + SIDES[i] + "_" + column;
     }
   }
-  text << "\n";
+  text << columns << "\n";
   return text.str();
 }
 

@@ -22,7 +22,9 @@ constexpr std::uint8_t ILLEGAL_FUNCTION = 1;
 class RobotiqSlave : public GripperServer::Slave {
 public:
   RobotiqSlave(GripperMotion &motion, const GripperServer::Options &options)
-      : motion_(motion), functions_(options.functions), slave_(static_cast<std::uint8_t>(options.slave == 0 ? SLAVE : options.slave)) {}
+      : motion_(motion), functions_(options.functions), slave_(static_cast<std::uint8_t>(options.slave == 0 ? SLAVE : options.slave)) {
+    command_[0] = done_[0] = motion.active() ? rACT : 0;
+  }
 
   double baud() const override { return BAUD; }
 

@@ -4,8 +4,7 @@
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/text.hpp"
 #include "library/pad/table_file.hpp"
-#include "simulation/cell/lift.hpp"
-#include "simulation/cell/press.hpp"
+#include "simulation/cell/simulations.hpp"
 #include "tool/advice.hpp"
 #include "tool/plain_help.hpp"
 
@@ -47,7 +46,7 @@ void run(Options &options, bool is_lift, bool is_validate) {
   if (!options.truth.empty()) {
     check_output(options.truth, options.overwrite);
   }
-  options.cache = options.cache.empty() ? tables_for(is_lift ? options.lift.face : PRESS_FACE) : options.cache;
+  options.cache = options.cache.empty() ? tables_for(is_lift ? LIFT_FACE : PRESS_FACE) : options.cache;
   if (is_lift) {
     static_cast<SimulationOptions &>(options.lift) = options;
     if (!options.kind.empty()) {
@@ -81,7 +80,6 @@ int main(int argc, char **argv) {
   std::string shape = name_of(object.shape);
   std::vector<std::string> planned_texts;
   bool is_press = false, is_lift = false, is_validate = false, by_command = false;
-  double lift_after_s = *options.lift.world.lift_after_s;
   const auto add = [&](const char *name, auto &value, const char *unit, const char *help) {
     return app.add_option(name, value, help)->type_name(unit);
   };
@@ -129,9 +127,6 @@ int main(int argc, char **argv) {
   for_lift(app.add_option("--gripper", options.lift.model, "Which one"))
       ->check(CLI::IsMember(texts_of(gripper_models(), [](const auto &one) { return one.model; })))
       ->capture_default_str();
-  for_lift(
-      app.add_option("--face", options.lift.face, "The indenter whose pressures a point of the object has, and a line or an area in a row"))
-      ->capture_default_str();
   CLI::Option *kind = app.add_option("--kind", options.kind, "A grasp of this kind, drawn by the seed: object, lift, and what happens then")
                           ->check(CLI::IsMember(texts_of(KINDS, name_of_any)));
   const std::size_t before_drawn = of_lift.size();
@@ -154,11 +149,9 @@ int main(int argc, char **argv) {
     }
   }
   for_lift(kind);
-  CLI::Option *after = lift_number("--lift-after", lift_after_s, "S", 0.1, 1e6, "Lift once the force has been steady for this time");
-  for_lift(app.add_flag("--by-command", by_command, "Lift only on the command"))->excludes(after);
+  for_lift(app.add_flag("--by-command", by_command, "Lift only on the command, not once the force is steady"));
   for_lift(add("--then", planned_texts, "KIND:AMOUNT@S",
                "A disturbance: pour:MASSES, jerk:M/S2, knock:M/S, slick:SHARE, or lower:SECONDS onto the table, @SECONDS after the lift"));
-  lift_number("--gain-error", options.lift.gain_sd, "SHARE", 0.0, 0.2, "That calibration left of the gains");
   lift_number("--patience", options.lift.patience_s, "S", 0.0, 3600.0,
               "Longest pause of the world while fingertips or the gripper's client are held up");
   for (CLI::Option *option : of_lift) {
@@ -177,7 +170,7 @@ int main(int argc, char **argv) {
     for (const std::string &text : planned_texts) {
       options.lift.world.planned.push_back(planned(text));
     }
-    options.lift.world.lift_after_s = by_command ? std::nullopt : std::optional(lift_after_s);
+    options.lift.world.lifts_by_itself = !by_command;
     object.shape = shape_of(shape);
     object.pads[0].friction = object.pads[1].friction = friction;
     stiffen(object);
@@ -185,7 +178,7 @@ int main(int argc, char **argv) {
     return 0;
   } catch (const Error &error) {
     print_error("fingertip", error);
-  } catch (const std::runtime_error &error) { // of the twin: a face that there is not
+  } catch (const std::runtime_error &error) {
     print_error("fingertip", Error(error.what()));
   }
   return 1;

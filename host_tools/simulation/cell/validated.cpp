@@ -3,7 +3,7 @@
 #include "libfingertip/random.hpp"
 #include "libfingertip/text.hpp"
 #include "simulation/cell/place.hpp"
-#include "simulation/cell/press.hpp"
+#include "simulation/cell/simulations.hpp"
 #include "simulation/twin/scenarios.hpp"
 #include "tool/calibration/solver.hpp"
 

@@ -33,13 +33,6 @@ Colour colour_of(std::uint8_t state) {
   }
 }
 
-std::string upper(std::string text) {
-  for (char &c : text) {
-    c = c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
-  }
-  return text;
-}
-
 void draw_head(Canvas &canvas, const GripModel &grip) {
   draw_bar(canvas, {0, 0, canvas.columns(), 1});
   int column = canvas.text(1, 0, "FINGERTIP ", {WHITE, BAR, true});

@@ -133,7 +133,6 @@ class Programs(CellTest):
         self.assertIn("is no disturbance", run("--then", "slick:1.2"))
         self.assertIn("2f85 opens to 85.0 mm", run("--width", "84"))
         self.assertIn("2f85", run("--gripper", "claw"))
-        self.assertIn("no_such_face", run("--face", "no_such_face"))
         pathlib.Path(self.truth_csv).touch()
         self.assertIn("truth.csv", run("--truth", self.truth_csv))
         with self.cell("--overwrite"):

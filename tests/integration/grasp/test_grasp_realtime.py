@@ -4,13 +4,12 @@ usage: test_grasp_realtime.py FINGERTIP FINGERTIP_SIMULATE TABLES [unittest argu
 """
 
 # real time: the tool as people run it, its clock, threads and serial ports, and a process that the kernel stops.
-import faulthandler
 import os
 import pathlib
 import signal
 import subprocess
 import sys
-import threading
+import time
 import unittest
 
 FINGERTIP, FINGERTIP_SIMULATE, TABLES = (os.path.abspath(path) for path in sys.argv[1:4])
@@ -22,15 +21,12 @@ from world_case import WorldCase  # noqa: E402
 # A machine that is held up for less than that changes nothing of what is asked here.
 HELD_UP = ("--timeout", "10000", "--silent", "5000", "--stale", "1000")
 STOPPED_s = 2  # a Robotiq reports a second without a command
-PATIENCE_s = 300  # then it ends and says where it waited
 
 
 class Stopped(WorldCase):
     def setUp(self):
         super().setUp()
         self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
-        faulthandler.dump_traceback_later(PATIENCE_s, exit=True)
-        self.addCleanup(faulthandler.cancel_dump_traceback_later)
 
     def start(self, *arguments):
         return self.world.start(arguments, env=self.environment, stdin=subprocess.PIPE)
@@ -51,9 +47,8 @@ class Stopped(WorldCase):
         self.until(tool, " s  holding ")
         for stopped in (tool, cell):
             os.kill(stopped.pid, signal.SIGSTOP)
-            go_on = threading.Timer(STOPPED_s, os.kill, (stopped.pid, signal.SIGCONT))
-            go_on.start()
-            go_on.join()
+            time.sleep(STOPPED_s)
+            os.kill(stopped.pid, signal.SIGCONT)
             cell.stdin.write("truth\n")
             cell.stdin.flush()
             self.until(cell, ",")

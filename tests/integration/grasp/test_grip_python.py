@@ -1,6 +1,6 @@
-"""The controller from Python: the names, the tool's commands once more from its recording, and the README's program on a simulated gripper.
+"""The controller from Python: the names, what it takes and gives, and the README's program on a simulated gripper.
 
-usage: test_grip_python.py SIMULATED_FINGERTIP FAKE_CELL TIME_KEEPER GRIP_TABLE FINGERTIP TABLES [unittest arguments]; FINGERTIP_LIBRARY
+usage: test_grip_python.py GRIP_TABLE FINGERTIP TABLES [unittest arguments]; FINGERTIP_LIBRARY
 """
 
 import dataclasses
@@ -14,15 +14,12 @@ import tempfile
 import types
 import unittest
 
-import numpy as np
-
-SIMULATED, FAKE_CELL, TIME_KEEPER, GRIP_TABLE, FINGERTIP, TABLES = (os.path.abspath(path) for path in sys.argv[1:7])
+GRIP_TABLE, FINGERTIP, TABLES = (os.path.abspath(path) for path in sys.argv[1:4])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
-from fingertip import BadValueError, files, grip, grip_file  # noqa: E402
+from fingertip import BadValueError, Flag, grip  # noqa: E402
 from fingertip.wire import Contact  # noqa: E402
 from readme_example import environment_of, simulated  # noqa: E402
-from world_case import WorldCase  # noqa: E402
 
 PATIENCE_s = 200
 TRAITS = next(iter(grip.TRAITS.values()))
@@ -63,66 +60,20 @@ class Names(unittest.TestCase):
             self.assertEqual(made.drive(gripper, 2 + 0.01 * i).gripper_fault, 255)
         self.assertEqual(made.drive(gripper, 3).state, grip.State.FAULT)
 
-
-class Replayed(WorldCase):
-    TIME_KEEPER = TIME_KEEPER
-
-    def record(self):
-        """A grasp by the tool, on simulated time: it is loaded, it slides, it is let go."""
-        cell = self.world.start([FAKE_CELL, self.folder], stdin=subprocess.PIPE)
-        self.addCleanup(cell.wait)
-        self.addCleanup(cell.kill)
-        self.assertEqual(cell.readline(), "ready\n")
-        self.environment["FINGERTIP_PORT"] = f"{self.folder}/left:{self.folder}/right"
-        words = f"grasp --gripper {next(iter(grip.TRAITS))} --gripper-port {self.folder}/gripper -o {self.csv}".split()
-        tool = self.world.start([SIMULATED, *words], env=self.environment)
-        while " s  holding " not in tool.readline():
-            pass
-        for command, seconds in (("load 2", 1.5), ("slide 1", 0.4), ("slide 0", 2.0)):
-            cell.stdin.write(command.encode() + b"\n")
-            cell.readline()
-            self.world.sleep(seconds)
-        tool.terminate()
-        tool.communicate()
-
-    def inputs(self, rows):
-        """Frames, answers and steps of the recording, in the order of time; frames come as late as the controller measured."""
-        delay_us = 1e6 * np.median(rows["delay_s"])
-        for finger, serial in enumerate(("AAAA", "BBBB")):
-            recording = files.read_recording(self.csv, serial=serial)
-            columns = np.array([recording.columns.get(name, np.zeros(len(recording.time_us))) for name in Contact._fields]).T
-            for time_us, contact in zip(recording.time_us, columns):
-                frame = types.SimpleNamespace(has_contact=True, host_us=time_us, t_us=0, sequence=0, contact=contact)
-                yield time_us + delay_us, 0, (finger, frame)
-        answers = {status_us: i for i, status_us in reversed(list(enumerate(rows["status_us"])))}
-        for status_us, i in answers.items():
-            answer = grip.Answer(*(rows[name][i] for name in ("width_mm", "moving", "active", "fault")), 1e-6 * status_us)
-            yield rows["time_us"][i] - 1, 1, answer
-        for i, time_us in enumerate(rows["time_us"]):
-            yield time_us, 2, i
-
-    def test_the_frames_of_a_grasp_give_its_commands(self):
-        self.record()
-        rows = grip_file.read_grip(self.csv)
+    def test_a_frame_is_the_contact_that_it_has(self):
+        """What the controller makes of it: unit.grasp.grip_c."""
         made = grip.Grip(TRAITS)
-        requested, course, off_mm = False, [], []
-        for time_us, kind, what in sorted(self.inputs(rows), key=lambda each: each[:2]):
-            if kind == 0:
-                made.take(*what)
-            elif kind == 1:
-                made.answer(what, 1e-6 * time_us)
-            elif rows["state"][what] not in ("idle", "still"):
-                requested = requested or made.request(grip.Request.GRASP)
-                command, report = made.step(1e-6 * time_us)
-                course.append((rows["state"][what], report.state.name.lower()))
-                if rows["motion"][what] == command.motion == grip.Motion.MOVE:
-                    off_mm.append(abs(command.width_mm - rows["command_mm"][what]))
-        by_tool, by_python = ([name for name, _ in itertools.groupby(names)] for names in zip(*course))
-        self.assertEqual(by_tool, by_python)
-        self.assertLessEqual({"approach", "squeeze", "ready", "holding", "slipping"}, set(by_tool))
-        # When within a step of its own the tool took a frame is not in the recording: now and then a move is one answer later.
-        self.assertLess(np.percentile(off_mm, 95), 0.001)
-        self.assertLessEqual(max(off_mm), 2.1 * TRAITS.step_mm)
+        contact = Contact(*[0] * len(Contact._fields))._replace(
+            sigma_mm=3.0, flags=int(Flag.CONTACT | Flag.FIT_VALID | Flag.TARED), force_N=3.25
+        )
+        frame = types.SimpleNamespace(has_contact=True, host_us=2e6, t_us=7, sequence=70000, contact=contact)
+        made.take(1, frame)
+        for ignored in ({"has_contact": False}, {"host_us": float("nan")}):
+            made.take(0, types.SimpleNamespace(**vars(frame) | ignored))
+        report = made.step(2.015)[1]
+        self.assertEqual(report.finger_N[0], 0.0)
+        self.assertAlmostEqual(report.finger_N[1], 3.25, places=6)
+        self.assertAlmostEqual(report.delay_s, 0.015)
 
 
 class Example(unittest.TestCase):
@@ -144,4 +95,4 @@ class Example(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(argv=[sys.argv[0], *sys.argv[7:]], verbosity=2)
+    unittest.main(argv=[sys.argv[0], *sys.argv[4:]], verbosity=2)

@@ -209,9 +209,7 @@ static GripWorld blind_world(double sigma_mm) {
 
 static GripWorld blind_carrier(double sigma_mm, double load_N) {
   GripWorld world = blind_world(sigma_mm);
-  world.grasp();
-  world.pull(load_N, 0.3);
-  world.run(1.0);
+  world.carry(load_N, 0.3, 1.0);
   return world;
 }
 

@@ -1,6 +1,5 @@
 #include "grasp/grip_row.hpp"
 #include "libfingertip/error.hpp"
-#include "libfingertip/recording_writer.hpp"
 #include "libfingertip/text.hpp"
 #include "support/host_packets.hpp"
 
@@ -132,39 +131,4 @@ TEST_F(GripRowFile, DamageIsSaidWithItsLineOrSkipped) {
     EXPECT_EQ(error.code(), ErrorCode::other_format);
   }
   EXPECT_THROW(GripRowReader(folder_ / "absent", false), Error);
-}
-
-TEST_F(GripRowFile, InAJointRecordingTheyComeInOrderOfTime) {
-  wire_info left = test::make_info(0, 0).body.info, right = left;
-  std::memcpy(right.serial, "BBBB\0", 5);
-  {
-    RecordingWriter writer(make_lines(path_, true, OutputFile::Appears::at_once), {left, right}, {{"grasp_cap", "20 N"}}, 1000000, false);
-    writer.comment(GRIP_ROW_KEY, 1000000, "time_us," + grip_columns());
-    for (std::uint32_t i = 0; i < 10; i++) {
-      const double host_us = 1000100 + 1000.0 * i;
-      for (std::size_t device : {0u, 1u}) {
-        writer.packet(device, test::make_contact(0, 5000 + 1000 * i, i), host_us);
-      }
-      writer.comment(GRIP_ROW_KEY, host_us + 500, fixed(host_us + 500 - 1000000, 1) + "," + grip_cells(row_with_everything()));
-      writer.comment(GRIP_EVENT_KEY, host_us + 500, "1,line\nbroken");
-    }
-    writer.settle(1004000);
-    writer.finish({{}, {}}, "ended");
-  }
-  /* in order of time with the rows of the fingertips */
-  std::ifstream file(path_);
-  double before_us = -1;
-  int grips = 0;
-  for (std::string line; std::getline(file, line);) {
-    const bool grip = line.rfind("# grip: ", 0) == 0;
-    if ((!grip && line[0] == '#') || line.find("time_us") != std::string::npos) {
-      continue;
-    }
-    const auto time_us = to_double(split(std::string_view(line).substr(grip ? 8 : 2), ',')[0]);
-    ASSERT_TRUE(time_us) << line;
-    EXPECT_GE(*time_us, before_us) << line;
-    before_us = *time_us;
-    grips += grip;
-  }
-  EXPECT_EQ(grips, 10);
 }

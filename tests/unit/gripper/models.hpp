@@ -8,10 +8,7 @@
 namespace fingertip::test {
 
 inline GripperServer::Options served(const std::string &model, std::vector<int> functions = {3, 4, 16, 23}) {
-  GripperServer::Options options;
-  options.model = model;
-  options.functions = functions;
-  return options;
+  return {.model = model, .functions = std::move(functions)};
 }
 
 inline std::unique_ptr<Gripper> opened(const std::string &model, const std::string &port) {

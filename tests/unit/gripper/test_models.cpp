@@ -32,10 +32,7 @@ TEST_P(GripperTest, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
       continue; /* its answers have no such word */
     }
     for (const bool polls : {true, false}) {
-      LineTrouble trouble;
-      trouble.fault = one.fault;
-      trouble.answers = 1;
-      simulated_.with([&](GripperServer &server, GripperMotion &) { server.trouble(trouble); });
+      simulated_.with([&](GripperServer &server, GripperMotion &) { server.trouble({.fault = one.fault, .answers = 1}); });
       EXPECT_EQ(code_of([&] { polls ? gripper_->poll() : gripper_->move(move); }), one.code) << static_cast<int>(one.fault) << polls;
       EXPECT_TRUE(gripper_->poll().active);
     }
@@ -71,11 +68,8 @@ TEST_P(GripperTest, NoStatusIsOlderThanItsQuestionHoweverLateAnswersCome) {
   Random random(7, 0, 0);
   int answers = 0;
   for (int i = 0; i < 2000; i++) {
-    simulated_.with([&](GripperServer &server, GripperMotion &) {
-      LineTrouble trouble;
-      trouble.late_s = std::max(0.0, random.uniform(-0.15, 0.15));
-      server.trouble(trouble);
-    });
+    const double late_s = std::max(0.0, random.uniform(-0.15, 0.15));
+    simulated_.with([&](GripperServer &server, GripperMotion &) { server.trouble({.late_s = late_s}); });
     const double before_mm = width_mm();
     try {
       if (i % 100 == 0) {

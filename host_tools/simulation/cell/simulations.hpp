@@ -1,0 +1,44 @@
+// The simulations of `fingertip simulate`. Each goes on until a signal comes, or its time is over. All throw Error.
+//
+// --press: a weight on a ball is set down evenly all over each fingertip, to look at, to record and to calibrate from. With --mouse a hand
+// presses instead (hand_server.hpp): the ball goes where the hand is, within some 30 ms, without friction. The pad: 12 mm of silicone
+// without ends, which remembers as the twin's does (memory, aftereffect; twin/effects.hpp). Gains differ by 10 %, and are not calibrated.
+//
+// --validate: a hand that goes through the steps of `fingertip validate` (validated.hpp) whenever a program sets the fingertip's frame
+// rate, as validate does first.
+//
+// --lift: an object between two fingertips on a gripper, which `fingertip grasp` grasps and a hand then lifts. Physics and gripper run in
+// this process, a fingertip's firmware in each of two others. Time that this process is held up is none for the world, nor is time in which
+// the others are waited for: fingertips and lines go on, with what is as it was. Lines of standard input are obeyed.
+#pragma once
+
+#include "simulation/cell/fingertip_cell_world.hpp"
+#include "simulation/cell/place.hpp"
+#include "simulation/cell/validated.hpp"
+
+namespace fingertip::cell {
+
+constexpr const char *PRESS_FACE = "sphere15"; // a ball of 15 mm, as calibrate asks for
+constexpr const char *LIFT_FACE = "sphere18";  // a point of the object; a line or an area is a row of them
+
+struct PressOptions : SimulationOptions {
+  std::size_t fingertips = 1; // 1 or 2
+  bool by_hand = false;
+  double weight_g = 300.0;
+};
+void press(const PressOptions &options, const Place &place);
+void validate(const ValidatedOptions &options, std::optional<double> seconds, const Place &place);
+
+struct LiftOptions : SimulationOptions {
+  std::string model = gripper_models().front().model;
+  World::Options world;
+  double opens_mm = 4.0, patience_s = 0.0;
+};
+// The first grasp of this kind at the options' seed (kinds.hpp), and how far the gripper is open then; gravity and the
+// object's stiffness are the options'. Errors and delays of frames are no part of it: the fingertips are the firmware.
+void be_of_kind(LiftOptions &options, Kind kind);
+// Throws Error, bad_value: the gripper does not open so far.
+void check(const LiftOptions &options);
+void lift(const LiftOptions &options, const Place &place);
+
+} // namespace fingertip::cell
