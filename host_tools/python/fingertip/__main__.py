@@ -1,6 +1,6 @@
 """The package's commands: what pip installs as fingertip-plot, fingertip-scenario and so on.
 
-    python -m fingertip plot|scenario|evaluate|fit|validate|ros2|bridge|recorder ...
+    python -m fingertip plot|scenario|evaluate|fit|validate|ros2|ros2_gripper|bridge|recorder ...
 
 --help after a command has its options.
 """
@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-COMMANDS = ("plot", "scenario", "evaluate", "fit", "validate", "ros2", "bridge", "recorder")
+COMMANDS = ("plot", "scenario", "evaluate", "fit", "validate", "ros2", "ros2_gripper", "bridge", "recorder")
 
 
 def command() -> Callable[[], Any]:

@@ -25,7 +25,7 @@ class Found(NamedTuple):
     share_socket: str = ""
 
 
-def _is_served(path: pathlib.Path) -> bool:
+def is_served(path: pathlib.Path) -> bool:
     """Also if this user may not connect."""
     if sys.platform == "win32":
         return False
@@ -37,7 +37,7 @@ def _is_served(path: pathlib.Path) -> bool:
     return True
 
 
-def _share_folders() -> list[pathlib.Path]:
+def share_folders() -> list[pathlib.Path]:
     """This user's, and everybody's; none on Windows."""
     if sys.platform == "win32":
         return []
@@ -58,10 +58,10 @@ def _share_folders() -> list[pathlib.Path]:
 def find_shared() -> list[Found]:
     """Those that somebody serves now; none on Windows."""
     found: list[Found] = []
-    for folder in _share_folders():
+    for folder in share_folders():
         with contextlib.suppress(OSError):
             for path in sorted(folder.glob("*.sock")):
-                if _is_served(path):
+                if is_served(path):
                     link = path.with_suffix(".port")
                     found.append(Found(path.stem, os.readlink(link) if link.is_symlink() else "", str(path)))
     return found
@@ -80,7 +80,7 @@ def _port_of(name: str) -> str:
     """The port that "sim:left" names: of a fingertip that `fingertip simulate` simulates; "sim:" is the first. Any other name is a port's own."""
     if not name.startswith(SIMULATED):
         return name
-    for folder in _share_folders():
+    for folder in share_folders():
         port = folder / "simulated" / (name.removeprefix(SIMULATED) or "left")
         if port.exists():
             return str(port)

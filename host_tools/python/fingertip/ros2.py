@@ -5,7 +5,7 @@
 Header stamps are the computer's clock (system time) at the middle of the sensors' conversion. QoS: reliable, volatile, the last 1000
 of each topic: readers of sensor data hear it too, and one that stalls for longer than 0.7 s misses what is older, while this goes on.
 ROS_DOMAIN_ID, ROS_LOCALHOST_ONLY=1 and ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST act as in ROS 2, CYCLONEDDS_URI as in cyclonedds. Judged by
-Fast DDS and rosbags; not run against ROS 2.
+Fast DDS and rosbags.
 """
 
 import argparse
@@ -203,7 +203,7 @@ def publish(publisher: Publisher, fingertips: Fingertips, is_over: Callable[[], 
 
 
 def main(argv: list[str]) -> int:
-    description = "Publishes what fingertips measure on topics of ROS 2, without ROS. Not run against ROS 2."
+    description = "Publishes what fingertips measure on topics of ROS 2, without ROS."
     parser = argparse.ArgumentParser(prog="fingertip-ros2", description=description)
     parser.add_argument("--device", action="append", metavar="SERIAL", help="a fingertip; all that are there, if none is named")
     parser.add_argument("--port", action="append", metavar="PORT", help="the same, by its serial port")

@@ -8,10 +8,10 @@ import itertools
 import os
 import pathlib
 import signal
-import socket
 import subprocess
 import sys
 import unittest
+from unittest import mock
 
 import numpy as np
 
@@ -19,7 +19,9 @@ FINGERTIP, FAKE_CELL, TIME_KEEPER = (os.path.abspath(path) for path in sys.argv[
 PLOT_PATIENCE_s = 300
 PYTHON_TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools/python"
 sys.path[:0] = [str(PYTHON_TOOLS), str(pathlib.Path(__file__).resolve().parents[2] / "support")]
-from fingertip import files, grip_file  # noqa: E402
+from fingertip import FingertipError, files, grip_file, host_time  # noqa: E402
+from fingertip.running_grasp import RunningGrasp  # noqa: E402
+from simulated_host_time import SimulatedHostTime  # noqa: E402
 from small_disk import disk_of  # noqa: E402
 from simulated_terminal import Terminal  # noqa: E402
 from world_case import WorldCase  # noqa: E402
@@ -230,27 +232,26 @@ class Course(GraspTest):
             process = self.holding("--quiet", "-o", self.csv, stderr=subprocess.STDOUT)
             self.tell("load 2")
             self.steady()
-            client = self.enterContext(socket.socket(socket.AF_UNIX))
-            client.connect(f"{self.folder}/fingertip/AAAA.grasp")
-
-            def ask(line):
-                client.sendall(line.encode() + b"\n")
-                self.world.wait([client.fileno()])
-                return client.recv(4096).decode()
-
-            self.assertRegex(ask("report"), r"^report state=holding trouble=\S* width_mm=[\d.]+ .*load_N=1\.0\d")
+            host_time.use(SimulatedHostTime(self.world))
+            self.enterContext(mock.patch.dict(os.environ, self.environment))
+            grasp = RunningGrasp("AAAA")
+            self.addCleanup(grasp.close)
+            report = grasp.report()
+            self.assertEqual((report["state"], report["load_N"][:3]), ("holding", "1.0"))
             before_N = self.steady()[1]
-            self.assertEqual(ask("mass=1.5"), "ok\n")
+            grasp.ask("mass=1.5")
             firm_N = self.steady()[1]
             self.assertGreater(firm_N, 1.5 * before_N)
-            self.assertIn("error cannot be while it is holding", ask("cap=5 grasp"))
+            for line, words in (
+                ("cap=5 grasp", "cannot be while it is holding"),
+                ("cap=500", "cap is not possible"),
+                ("nonsense", "nonsense"),
+            ):
+                self.assertRaisesRegex(FingertipError, words, grasp.ask, line)
             self.assertAlmostEqual(self.steady()[1], firm_N, delta=0.5)  # all of it or nothing
-            self.assertIn("cap is not possible", ask("cap=500"))
-            self.assertIn("nonsense", ask("nonsense"))
-            self.assertEqual(ask("mass=0 place"), "ok\n")
-            self.world.wait([client.fileno()])
-            self.assertEqual(client.recv(4096), b"state placing\n")
-            self.assertIn("error cannot be while it is placing", ask("place"))
+            grasp.ask("mass=0 place")
+            self.assertRaisesRegex(FingertipError, "cannot be while it is placing", grasp.ask, "place")
+            self.assertEqual(grasp.states(), ["placing"])
             self.tell("load 0")
             self.until_state(process, "open")
             process.terminate()

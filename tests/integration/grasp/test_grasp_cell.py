@@ -14,13 +14,16 @@ import subprocess
 import sys
 import threading
 import unittest
+from unittest import mock
 
 import numpy as np
 
 FINGERTIP, FINGERTIP_SIMULATE, TIME_KEEPER, TABLES = (os.path.abspath(path) for path in sys.argv[1:5])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
-from fingertip import files, grip_file  # noqa: E402
+import ros2_stand_in  # noqa: E402
+from fingertip import files, grip_file, host_time, ros2_gripper  # noqa: E402
+from simulated_host_time import SimulatedHostTime  # noqa: E402
 from world_case import WorldCase  # noqa: E402
 
 PATIENCE_s = 60
@@ -337,6 +340,73 @@ class WhileHolding(Faults, CellTest):
 
     def test_the_object_is_taken_away(self):
         self.run_fault("take", words=["the gripper keeps its position"], ends=(MISSED, DROPPED))
+
+
+class Ros2(CellTest):
+    """The actions of ROS 2, on a stand-in of rclpy."""
+
+    def setUp(self):
+        super().setUp()
+        self.enterContext(mock.patch.dict(os.environ, self.environment))
+        host_time.use(SimulatedHostTime(self.world))
+        ros2_stand_in.install()
+        self.node = ros2_stand_in.Node()
+        ros2_gripper.GripperAction(self.node)
+
+    def send(self, *gaps_m, max_effort=0.0, parallel=False):
+        """A goal; None: it was rejected."""
+        goal = (ros2_stand_in.ParallelGripperCommand if parallel else ros2_stand_in.GripperCommand).Goal()
+        if parallel:
+            goal.command.name, goal.command.position, goal.command.effort, goal.command.velocity = ["jaw"], list(gaps_m), [8.0], [0.05]
+        else:
+            goal.command.position, goal.command.max_effort = *gaps_m, max_effort
+        return self.node.servers["~/parallel_gripper_cmd" if parallel else "~/gripper_cmd"].send(goal)
+
+    def assert_ends(self, handle, status, stalled, reached_goal):
+        ended, result = self.node.end(handle)
+        self.assertEqual((ended, result.stalled, result.reached_goal), (status, stalled, reached_goal), self.node.said[-1])
+        return result
+
+    def test_goals(self):
+        with self.cell():
+            self.assertIsNone(self.send(0.0, max_effort=8.0), "no grasp runs")
+            process = self.start("--wait")
+            self.wait_for(lambda: any(pathlib.Path(self.folder).glob("fingertip/*.grasp")), "no socket")
+            self.pass_time(1.0)
+            self.assertAlmostEqual(self.now()["width_mm"], 44, delta=1)  # it waits
+            for gap_m, max_effort in ((0.0, 200.0), (0.12, 0.0), (float("nan"), 0.0), (-0.001, 0.0)):
+                self.assertIsNone(self.send(gap_m, max_effort=max_effort), gap_m)
+            result = self.assert_ends(self.send(0.042), "succeeded", False, True)
+            self.assertAlmostEqual(1e3 * result.position, self.now()["width_mm"], delta=0.5)
+            self.assert_ends(self.send(0.06), "succeeded", False, True)
+            # Cancelled, the width stays.
+            handle = self.send(0.0, max_effort=8.0)
+            self.pass_time(0.5)
+            self.node.servers["~/gripper_cmd"].cancel(handle)
+            self.assert_ends(handle, "canceled", False, False)
+            width_mm = self.now()["width_mm"]
+            self.pass_time(0.5)
+            self.assertAlmostEqual(self.now()["width_mm"], width_mm, delta=1)
+            # A second goal aborts the first and goes on.
+            first, second = self.send(0.0, max_effort=8.0), self.send(0.0, max_effort=9.0)
+            self.assert_ends(first, "aborted", False, False)
+            result = self.assert_ends(second, "succeeded", True, False)
+            self.assertAlmostEqual(result.effort, self.now()["force_N"], delta=0.5)
+            self.assertLess(1.0, max(each.effort for each in second.feedback))
+            # What is held stays, whatever is refused.
+            self.assertIsNone(self.send(0.0, max_effort=0.1))
+            self.assertIsNone(self.send(0.0, 0.07, parallel=True))
+            self.assert_ends(self.send(0.0, max_effort=10.0), "succeeded", True, False)
+            self.assertEqual(self.assert_ends(self.send(0.07, parallel=True), "succeeded", False, True).state.name, ["jaw"])
+            # Nothing there: it closes. Then the grasp ends while it opens.
+            self.tell("take")
+            self.assert_ends(self.send(0.0, max_effort=8.0), "succeeded", False, True)
+            handle = self.send(0.08)
+            process.terminate()
+            self.assert_ends(handle, "aborted", False, False)
+            process.wait()
+        for words in ("no `fingertip grasp` runs", "give 0.5 to 100 N", "opens to 85.0 mm", "2 positions", "a new goal"):
+            self.assertTrue(any(words in line for line in self.node.said), (words, self.node.said))
 
 
 if __name__ == "__main__":

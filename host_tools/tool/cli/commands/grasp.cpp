@@ -42,6 +42,7 @@ struct GraspOptions {
   std::map<std::string, double> limits;   /* by name, grasp/settings.hpp */
   std::map<std::string, double> breaking; /* the same, of a preset; limits override them */
   bool activate = false;
+  bool wait = false;             /* for requests: it neither grasps nor ends by itself */
   std::optional<double> seconds; /* since both fingertips stream */
   std::string recording;         /* empty: none */
   bool overwrite = false;
@@ -61,6 +62,16 @@ constexpr std::int64_t ROW_us = 10000;
 constexpr std::int64_t TARING_us = 3000000;
 /* Without a terminal it ends TAIL_us after the grasp, and waits INACTIVE_us at most for a gripper that may not be activated. */
 constexpr std::int64_t TAIL_us = 300000, INACTIVE_us = 2000000;
+
+constexpr struct {
+  char key;
+  GripRequest request;
+  const char *name;
+} KEYS[] = {{'o', GRIP_REQUEST_RELEASE, "open"},
+            {'h', GRIP_REQUEST_HOLD, "hold"},
+            {'g', GRIP_REQUEST_GRASP, "grasp"},
+            {'p', GRIP_REQUEST_PLACE, "place"},
+            {'r', GRIP_REQUEST_HAND_OVER, "hand over"}};
 
 std::optional<Way> way_of(const std::string &text, Reach reach) {
   if (text.empty()) {
@@ -296,9 +307,7 @@ private:
         lost_fingers_++;
       }
       break;
-    case Kind::ready:
-    case Kind::mute:
-    case Kind::bytes: break;
+    default: break;
     }
   }
 
@@ -317,7 +326,9 @@ private:
           message_.show(std::string(SIDES[i]) + " has contact already, which is taken for the object");
         }
       }
-      wish(GRIP_REQUEST_GRASP, "grasp");
+      if (!options_.wait) {
+        wish(GRIP_REQUEST_GRASP, "grasp");
+      }
     }
   }
 
@@ -388,7 +399,8 @@ private:
     inactive_since_us_ = is_inactive ? inactive_since_us_ : steady_now_us();
     bool never_active = steady_now_us() - inactive_since_us_ > INACTIVE_us;
     bool opened = state() == GRIP_OPEN && interrupts() > 1;
-    return !failure_.empty() || quit_ || end_requested() || interrupts() > 2 || opened || (!has_keys_ && (at_end || never_active)) ||
+    return !failure_.empty() || quit_ || end_requested() || interrupts() > 2 || opened ||
+           (!has_keys_ && !options_.wait && (at_end || never_active)) ||
            (options_.seconds && static_cast<double>(since_begin_us) > 1e6 * *options_.seconds);
   }
 
@@ -397,7 +409,7 @@ private:
       models_[i].set_statistics(loop_.statistics(i));
     }
     Caption caption;
-    caption.keys = "q end, holding  o open  h hold  g grasp  p place  r hand over";
+    caption.keys = "q end, holding" + joined(KEYS, "", [](const auto &one) { return std::string("  ") + one.key + " " + one.name; });
     caption.note = joined(std::vector{message_.text(), fault_.empty() ? trouble_ : fault_, lost_}, "  ");
     if (caption.note.empty() && recording_) {
       caption.note = has_keys_ ? "recording to " + printable(options_.recording) : "";
@@ -411,16 +423,8 @@ private:
 
   void take_key(Key key) {
     quit_ = quit_ || key == 'q';
-    if (key == 'o') {
-      wish(GRIP_REQUEST_RELEASE, "open");
-    } else if (key == 'h') {
-      wish(GRIP_REQUEST_HOLD, "hold");
-    } else if (key == 'p') {
-      wish(GRIP_REQUEST_PLACE, "place");
-    } else if (key == 'r') {
-      wish(GRIP_REQUEST_HAND_OVER, "hand over");
-    } else if (key == 'g') {
-      wish(GRIP_REQUEST_GRASP, "grasp");
+    if (const auto *asked = find_in(KEYS, [&](const auto &one) { return key == one.key; })) {
+      wish(asked->request, asked->name);
     }
   }
 
@@ -565,6 +569,7 @@ void add_grasp(CommandLine &line) {
   with_value(command, "SERIAL|PORT", "--left", options->left, "Fingertip; default: the first of two");
   with_value(command, "SERIAL|PORT", "--right", options->right, "Fingertip; default: the other");
   command->add_flag("--activate", options->activate, "Activate a gripper that is not: it moves, and drops what it holds");
+  command->add_flag("--wait", options->wait, "Grasp on request only (keys, socket), and do not end with a grasp");
   with_seconds(command, options->seconds, "End after this long, the gripper holding");
   with_value(command, "FILE.csv|FILE.mcap", "-o,--record", options->recording, "Record all of it");
   command->add_flag("--overwrite", options->overwrite, "Replace the recording if it exists");
