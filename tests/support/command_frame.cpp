@@ -2,9 +2,8 @@
 //
 // usage: command_frame [--sequence N] COMMAND [ARGS]
 //
-// COMMAND: stream none|contact,raw,health; tare; tare-force; rate HZ|max; osr N; slip THRESHOLD_MM WINDOW_MS; prior
-// SIGMA[:WIDTH]|none; limit MM; keep; forget; calibrate SIGMA_MM DIP_PERCENT; erase (the calibration); pad THICKNESS_MM
-// OVERHANG_MM; pad-from-touch, with the same; erase-pad; sync MODE|off; info; health; crash; loader
+// COMMAND: stream none|contact,raw,health; tare; rate HZ|max; osr N; slip THRESHOLD_MM WINDOW_MS; keep; forget; calibrate SIGMA_MM
+// DIP_PERCENT; pad THICKNESS_MM OVERHANG_MM; sync MODE|off; info; health; crash; loader
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/names.hpp"
@@ -30,8 +29,8 @@ static double number(const std::string &text) {
   return *value;
 }
 
-static wire_packet pad_of(const std::string &thickness, const std::string &overhang, bool from_touch) {
-  return command_pad(pad::profile_over_own_sensors({number(thickness), number(overhang), from_touch}));
+static wire_packet pad_of(const std::string &thickness, const std::string &overhang) {
+  return command_pad(pad::profile_over_own_sensors({number(thickness), number(overhang)}));
 }
 
 /* Of fifteen sensors that are alike. */
@@ -79,7 +78,9 @@ static wire_packet packet_from_words(const std::vector<std::string> &words) {
   std::map<std::string, Form> forms = {
       {"stream", {1, [&] { return command_stream(streams_of(word(1))); }}},
       {"tare", {0, [] { return command_tare(); }}},
-      {"tare-force", {0, [] { return command_tare(true); }}},
+      {"rate", {1, [&] { return command_of({"rate=" + word(1)}); }}},
+      {"osr", {1, [&] { return command_of({"osr=" + word(1)}); }}},
+      {"sync", {1, [&] { return command_of({"sync=" + word(1)}); }}},
       {"slip",
        {2,
         [&] {
@@ -92,14 +93,8 @@ static wire_packet packet_from_words(const std::vector<std::string> &words) {
       {"keep", {0, [] { return command_keep(true); }}},
       {"forget", {0, [] { return command_keep(false); }}},
       {"calibrate", {2, [&] { return calibration_of(word(1), word(2)); }}},
-      {"erase", {0, command_erase_calibration}},
-      {"pad", {2, [&] { return pad_of(word(1), word(2), false); }}},
-      {"pad-from-touch", {2, [&] { return pad_of(word(1), word(2), true); }}},
-      {"erase-pad", {0, command_erase_pad}},
+      {"pad", {2, [&] { return pad_of(word(1), word(2)); }}},
   };
-  for (const char *setting : {"rate", "osr", "prior", "limit", "sync"}) {
-    forms[setting] = {1, [&, setting] { return command_of({std::string(setting) + "=" + word(1)}); }};
-  }
   const auto form = forms.find(words.empty() ? "" : words[0]);
   if (form == forms.end() || words.size() != 1 + form->second.arguments) {
     throw Error("such a command is unknown; the source lists them with their arguments");
