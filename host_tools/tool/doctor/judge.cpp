@@ -89,7 +89,7 @@ public:
       firmware();
       stored();
     }
-    if (facts_.after) {
+    if (facts_.after && facts_.info) {
       sensors();
       calibration_memories();
       bus();
@@ -99,7 +99,7 @@ public:
       }
       processor();
     }
-    if (facts_.rest) {
+    if (facts_.rest && facts_.info) {
       rate();
       packets();
       if (facts_.info->sync == SYNC_IN) {
