@@ -1,12 +1,13 @@
 """The inputs of the test: recordings, CSV and MCAP, of one fingertip and of two; bytes of lines; settings as people type them. Good ones, the
 same damaged in ways that have a name, and by chance. All follow from here, from tests/vectors/wire and from tests/fuzz/corpus.
 
-A job is {"name", "kind": "recording" | "stream" | "setting", "input": path or text, "salvage", "device"}, and of some recordings "rows_of", "is_whole", "part".
+A job is {"name", "kind": "recording" | "stream" | "setting", "input": path or text, "salvage", "device"}, and of some recordings "rows_of", "is_whole", "part", "rows".
 """
 
 import bz2
 import gzip
 import io
+import json
 import lzma
 import pathlib
 import random
@@ -40,8 +41,8 @@ class Corpus:
         self.folder = pathlib.Path(folder)
         self.jobs = []
 
-    def recording(self, name, content, end="csv", devices=("",), rows_of="", is_whole=True, part=None):
-        """rows_of: the name of a recording with the same rows; all of them if it is_whole. part: begin and end in seconds, and rows."""
+    def recording(self, name, content, end="csv", devices=("",), rows_of="", is_whole=True, **known):
+        """rows_of: the name of a recording with the same rows; all of them if it is_whole. known: rows, their number; part: begin and end in s, rows."""
         path = self.folder / f"{name}.{end}"
         with path.open("xb") as file:  # no name twice
             file.write(content)
@@ -50,7 +51,7 @@ class Corpus:
                 words = [name, end, *filter(None, [device]), *["salvage"] * salvage]
                 job = {"name": " ".join(words), "kind": "recording", "input": str(path), "salvage": salvage, "device": device}
                 same = {"rows_of": " ".join([rows_of, *words[1:]]), "is_whole": is_whole} if rows_of else {}
-                self.jobs.append(job | same | ({"part": part} if part else {}))
+                self.jobs.append(job | same | known)
         return path
 
     def stream(self, name, content):
@@ -116,49 +117,9 @@ def without_columns(lines, names):
     return [",".join(cells[at] for at in kept) if len(cells := line.split(",")) == len(header) else line for line in lines]
 
 
-# Of a row, by their columns.
-CELLS = {
-    "x_mm": ("nan", "", "+1", " 1", "1 ", "1_0", "0x1p3", ".", "1e", "-.5e-1", "1.", "1E-2", "1e-45", "3.4028235e38")
-    + ("3.4028236e38", "one", "-0", "1\r", "1\0"),
-    "force_N": ("inf", "1e39", "1e-50", "1e-400", "0." + 46 * "0" + "1"),
-    "flags": ("-1", "4294967296", "2.0", "1e3"),
-    "sequence": ("-0", "65536", "65535", "007", ""),
-    "fit_us": ("", "65536"),
-    "t_us": ("-5", "-0", "", "18446744073709551616", "9007199254740992", "\u0665"),
-    "frame": ("", "4294967296", "9" * 5000),
-    "s0_Pa": ("3000000.0", "2097151.9990", "2097151.9996", "-2097152.0", "-2097152.001", "1e13", "0.00048828125"),
-    "s1_Pa": ("nan",),
-    "s3_Pa": ("",),
-    "tare2_Pa": ("1e5",),
-    "temperature_degC": ("327.68", "327.674", "-327.68", ""),
-}
-ACK = "ack sequence=1 t_us=2 command=1 result=0 command_sequence=3 host_time_us=4"
-# By their keys.
-COMMENTS = {
-    "weather": ("fine",),
-    "note": ("", "\udcff\udcfe"),
-    "packet": ("weather sequence=1 t_us=1", "health", "ack sequence", ACK.rpartition(" ")[0], ACK + " colour=5")
-    + tuple(ACK.replace("command=1", f"command={word}") for word in ("256", "-1", "one"))
-    + (ACK.replace(" t_us", " sequence=9 t_us"), ACK.replace("ack", "ack ")),
-    "event": ("back", "\udcff"),
-    "sensors": ("many",),
-    "rate_mHz": ("abc", "4294967296"),
-    "osr": ("-5",),
-    "x_mm": (" ".join(["1"] * 33), "1 b", "1  2", ""),
-    "gains": ("nan",),
-    "off_x_um": ("1 -32769",),
-    "wider_q15": ("1.5",),
-    "off_y_um": ("-32768 32767",),
-    "pad_thickness_mm": ("thick",),
-    "pad_shares": ("1 2 3",),
-    "pad_from_touch": ("256",),
-    "calibration_date_s": ("x",),
-    "firmware": ("1.2", "1.2.256"),
-    "serial": ("\u00e4", "\x1b", "\x7f", "0123456789abcdefg"),
-    "end": ("reason", "frames=1 ", "reason=x frames=many"),
-    "0/note": ("x",),
-    "prior_sigma_mm": ("1e39",),
-}
+# Cells of a row by their columns, comments by their keys, settings by their names.
+CELLS, COMMENTS, SETTINGS = json.loads((ROOT / "tests/formats/values.json").read_text(encoding="utf-8")).values()
+CELLS["frame"].append("9" * 5000)
 LINES = ("# just a comment", "#note:x", "# note:", *(f"# {key}: {value}" for key, values in COMMENTS.items() for value in values))
 
 
@@ -229,9 +190,8 @@ def csv_cases(corpus, name, text, devices):
         add(f"comment_{number}", [*lines[:row], own, *lines[row:]])
         add(f"head_{number}", [*lines[:header], own, *lines[header:]])
     prng = random.Random(name)
-    words = (b"", b"\r\n", b",,", b"-0", b"1e3", b"#", b"\n\n", b" ", b"\xb5", b": ", b"/", b"9", b"=")
     for chance in range(CHANCES):
-        add(f"chance_{chance}", damaged(text, prng, words))
+        add(f"chance_{chance}", fuzz.damaged(text, [text], prng))
 
 
 def without_flags(header, row):
@@ -241,17 +201,6 @@ def without_flags(header, row):
         later = Flag.TANGENTIAL_VALID | Flag.VELOCITY_VALID | Flag.SHAPE_VALID | Flag.TWO_CONTACTS | Flag.EDGE
         cells["flags"] = str(int(cells["flags"]) & ~later)
     return ",".join(cells.values())
-
-
-def damaged(content, prng, words):
-    data = bytearray(content)
-    for _ in range(prng.randrange(1, 4)):
-        at = prng.randrange(24, len(data))
-        if prng.randrange(3):
-            data[at : at + prng.randrange(3)] = prng.choice(words)
-        else:
-            data[at] ^= 1 << prng.randrange(8)
-    return bytes(data[: prng.randrange(len(data) // 2, len(data) + 1)] if not prng.randrange(4) else data)
 
 
 def joint_cases(corpus, text):
@@ -266,7 +215,7 @@ def joint_cases(corpus, text):
     add("devices_late", [*lines[:1], *lines[2:], lines[1]])
     add("header_of_one", [line.removeprefix("device,time_us,") if at == header else line for at, line in enumerate(lines)])
     changes = [("0,", "00,"), ("0,", "5,"), *(("0,1000.5,", f"0,{time},") for time in ("", "noon", "inf")), ("1,2000.5,", "1,-2000.5,")]
-    changes += [("0,1000.5,41177,", "0,1000.5#"), ("1,2000.5,2990954", "1,2000.5,x"), ("0,1000.5,41177", "0")]
+    changes += [("0,", "AAAA,"), ("0,1000.5,41177,", "0,1000.5#"), ("1,2000.5,2990954", "1,2000.5,x"), ("0,1000.5,41177", "0")]
     for number, change in enumerate(changes):
         add(f"row_{number}", [line.replace(*change, 1) if line.startswith(change[0]) else line for line in lines])
     of_one = ("0/end: frames", "1/end: frames", "9/event: x", "00/event: x", "0/a/b: c")
@@ -349,17 +298,6 @@ def cases_by_others(corpus, name, bag, devices):
             corpus.recording(f"{name}_unlisted", data[:at] + b"\x7f" + data[at + 1 :], "mcap", devices, f"{name}_whole", False)
     for pack in (zstandard.compress, gzip.compress, lz4.frame.compress, bz2.compress, lzma.compress):
         corpus.recording(f"{name}_packed_as_a_whole_by_{pack.__module__.split('.')[0]}", pack(bag.read_bytes()), "mcap", devices)
-
-
-def circular_index():
-    """An index whose chunks are one within the other, the inner one the earlier: from the end of both it leads back to the outer one."""
-    ends_both = b"\x80" + struct.pack("<Q", 20) + bytes(20)
-    outer = b"\x81" + struct.pack("<Q", 11 + len(ends_both)) + bytes(11) + ends_both
-    head = b"\x89MCAP0\r\n\1" + struct.pack("<QII", 8, 0, 0)
-    at, summary = len(head), len(head + outer)
-    indexes = [(10, at), (5, at + 20)]
-    chunks = [b"\x08" + struct.pack("<QQQQQIQIQQ", 64, begin_ns, begin_ns, place, 9, 0, 0, 0, 0, 0) for begin_ns, place in indexes]
-    return head + outer + b"".join(chunks) + b"\2" + struct.pack("<QQQI", 20, summary, 0, 0) + head[:8]
 
 
 def part_cases(corpus, text, convert):
@@ -464,10 +402,7 @@ def bag_cases(corpus, name, content, devices, chances):
     def add(what, data):
         corpus.recording(f"{name}_{what}", data, "mcap", devices)
 
-    path = corpus.folder / "scratch.mcap"
-    path.write_bytes(content)
-    with open(path, "rb") as file:
-        chunks = make_reader(file).get_summary().chunk_indexes
+    chunks = make_reader(io.BytesIO(content)).get_summary().chunk_indexes
     add("whole", content)
     for chunk in (chunks[0], chunks[-1]):
         start, end = chunk.chunk_start_offset, chunk.chunk_start_offset + chunk.chunk_length
@@ -570,17 +505,6 @@ def stream_cases(corpus):
     add("noise", bytes(prng.randrange(256) for _ in range(4000)))
 
 
-SETTINGS = {
-    "osr": "256 257 300 512 1024 2048 4096 8192 16384 65792 128 0 -256 256.0 many 0256",
-    "rate": "max 0.1 0.09 0.099 2000 2000.1 0 -1 nan inf fast none 20Hz 12.3456 1.005 1e2 1e99",
-    "slip_threshold": "0.01 0.009 50 50.1 0 -1 nan x",
-    "slip_window": "0 5 4 1000 1001 65541 -5 7.5 99999999999999999999 x",
-    "prior": "none 0 0:0 0.5 0.4 100 101 3.1:0.5 100:0.01 3:0 3:100 3:101 3:x 3:nan :0.5 -3 inf x nan",
-    "sync": "off in frame second out In infinity 1 0",
-    "limit": "0.01 0.001 0.6 100 101 0 none nan x",
-}
-
-
 def fuzz_seed(path):
     content = path.read_bytes()[1:]
     if not content.startswith(b"\x89MCAP0") or schema_of(CONTACT_TYPE).encode() not in content:
@@ -609,10 +533,10 @@ def make(folder, convert):
             cases_by_others(corpus, "one_bag", by_tool, devices)
             by_lz4 = rewritten(corpus, by_tool, compression=mcap.writer.CompressionType.LZ4)
             bag_cases(corpus, "one_packed_by_lz4", by_lz4, devices, CHANCES)
-        if name == "one":
             inner_cases(corpus, messages_of(by_tool), devices)
     part_cases(corpus, one, convert)
-    corpus.recording("circular_index", circular_index(), "mcap")
+    for path in sorted((ROOT / "tests/formats/found").iterdir()):  # NAME.ROWS.csv: each was once read otherwise by one of the three
+        corpus.recording(f"found_{path.stem}", path.read_bytes(), path.suffix[1:], ("BBBB",), rows=int(path.stem.split(".")[1]))
     lines, bag = lines_of(two), corpus.folder / "start_many.mcap"
     rows = [line.replace("000.5", f"{time:03}.5", 1) for time in (*range(40), *range(30, 70)) for line in lines if line[0].isdigit()]
     start.write_bytes(text_of([*lines[: header_at(lines) + 1], *rows, lines[-1]]))
@@ -627,6 +551,6 @@ def make(folder, convert):
         corpus.recording(f"fuzz_{path.name}", fuzz_seed(path), "mcap", ("", "AAAA", "BBBB"))
     stream_cases(corpus)
     for name, values in SETTINGS.items():
-        for value in ("", *values.split()):
+        for value in values:
             corpus.setting(f"{name}={value}")
     return corpus.jobs

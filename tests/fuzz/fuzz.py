@@ -34,6 +34,12 @@ HANGS_s = 300
 POOL, BATCH = 64, 500  # of the walk
 INTERRUPTED = 72  # exit status of libFuzzer
 TEST_SEED = 1
+# In place of cells and lines of recordings.
+WORDS = (b"18446744073709551616", b"-1", b"1e400", b"nan", b"inf", b"0x10", b"1_000", b"", b"\n", b"\r\n", b",", b"#", b": ", b"\x00") + (
+    b"\xff\xfe",
+    b"\xe2\x80\xa8",
+    *(f"# {key}: {value}".encode() for key, value in {"end": "", "packet": "info", "grip": "", "devices": ""}.items()),
+)
 
 
 class Stop(Exception):
@@ -110,6 +116,16 @@ def changed(data, pool, max_len, prng):
         )
         data = (data[:at] + new + data[at + taken :])[:max_len]
     return data
+
+
+def damaged(data, seeds, prng):
+    """Words in place of cells, lines, or what is between them; then maybe anything."""
+    for _ in range(prng.randrange(1, 5)):
+        parts = re.split(rb"([,\n])", data)
+        at = prng.randrange(len(parts))
+        parts[at : at + prng.choice((0, 1, 1, 20))] = prng.choice(([prng.choice(WORDS)], [prng.choice(parts)], []))
+        data = b"".join(parts)
+    return changed(data, seeds, 1 << 16, prng) if prng.randrange(2) else data
 
 
 def walk(seeds, runs, max_len, seed):

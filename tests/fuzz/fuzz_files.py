@@ -9,7 +9,6 @@ libFuzzer cannot see into Python: these are the seeds of `corpus`, damaged at ra
 import argparse
 import pathlib
 import random
-import re
 import sys
 import tempfile
 
@@ -22,11 +21,6 @@ from grasp import read_truth  # noqa: E402
 
 TRUTH = "# fingertip-truth 1\nt_s,slips,slid_mm,force_N\n0.000,0,0.0,0.1\n0.002,1,0.5,2.5\n"
 RUN = '{"device_time_zero_s": 0.25, "warnings": [], "cycles": 5}\n'
-WORDS = (b"18446744073709551616", b"-1", b"1e400", b"nan", b"inf", b"0x10", b"1_000", b"", b"\n", b"\r\n", b",", b"#", b": ", b"\x00") + (
-    b"\xff\xfe",
-    b"\xe2\x80\xa8",
-    *(f"# {key}: {value}".encode() for key, value in {"end": "", "packet": "info", "grip": "", "devices": ""}.items()),
-)
 
 
 def check_recording(path, prng):
@@ -52,16 +46,6 @@ def check_run(path, _):
     assert isinstance(files.read_run(path), dict)
 
 
-def damaged(data, seeds, prng):
-    """Words in place of cells, lines, or what is between them; then maybe anything."""
-    for _ in range(prng.randrange(1, 5)):
-        parts = re.split(rb"([,\n])", data)
-        at = prng.randrange(len(parts))
-        parts[at : at + prng.choice((0, 1, 1, 20))] = prng.choice(([prng.choice(WORDS)], [prng.choice(parts)], []))
-        data = b"".join(parts)
-    return fuzz.changed(data, seeds, 1 << 16, prng) if prng.randrange(2) else data
-
-
 def main(argv):
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--runs", type=int, required=True)
@@ -81,7 +65,7 @@ def main(argv):
         path = pathlib.Path(folder) / "file"
         for run in range(options.runs):
             check, seed = jobs[run % len(jobs)]
-            data = damaged(seed, seeds, prng)
+            data = fuzz.damaged(seed, seeds, prng)
             path.write_bytes(data)
             try:
                 check(path, prng)

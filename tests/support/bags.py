@@ -241,20 +241,20 @@ def differences(csv_path, bag):
     periods = [time_ns // 10**7 for time_ns, _ in by_topic["contact"]]  # a hundred a second have their numbers in other messages, too
     repeated = [row for (_, row), one, before in zip(by_topic["contact"], periods, [-1, *periods]) if one != before]
     for topic, parts in (("wrench", (0, 1)), ("place", (2,))):
-        told = collections.Counter()
-        for contact in repeated:
-            if contact["has_contact"]:
-                told[json.dumps([expected_wrench(contact)[part] for part in parts])] += 1
+        wanted = [expected_wrench(contact) for contact in repeated if contact["has_contact"]]
+        told = collections.Counter(json.dumps([wrench[part] for part in parts]) for wrench in wanted)
         found = collections.Counter()
         for _, message in by_topic[topic]:
             vectors = [message["wrench"]["force"], message["wrench"]["torque"]] if topic == "wrench" else [message["point"]]
             found[json.dumps([[vector[axis] for axis in "xyz"] for vector in vectors])] += 1
         differ += sum(((told - found) + (found - told)).values())
-    told = collections.Counter()
-    for contact in repeated:
-        if contact["has_raw"]:
-            over = [binary32(a - b) for a, b in zip(contact["pressure_pa"], contact["tare_pa"])]
-            told[json.dumps([each if contact["valid"] >> k & 1 else "NaN" for k, each in enumerate(over)])] += 1
+    told = collections.Counter(
+        json.dumps(
+            [binary32(a - b) if row["valid"] >> k & 1 else "NaN" for k, (a, b) in enumerate(zip(row["pressure_pa"], row["tare_pa"]))]
+        )
+        for row in repeated
+        if row["has_raw"]
+    )
     found = collections.Counter(
         json.dumps([plain(float(values[3])) for values in np.frombuffer(bytes(message["data"]), "<f4").reshape(-1, 4)])
         for _, message in by_topic["pressures"]

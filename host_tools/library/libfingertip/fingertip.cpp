@@ -71,14 +71,12 @@ static double load(Kind kind, const std::uint8_t *from) {
 static void store(const Field &field, double value, std::uint8_t *to) {
   visit_kind(field.kind, [&](auto number) {
     using Number = decltype(number);
-    if constexpr (std::is_integral_v<Number>) {
-      /* The next number above the largest, which a double has exactly. */
-      const double above = std::ldexp(1.0, std::numeric_limits<Number>::digits);
-      if (!(value >= static_cast<double>(std::numeric_limits<Number>::min()) && value < above) || value != std::floor(value)) {
-        throw Error(ErrorCode::bad_value, std::string(field.name) + " is out of range");
-      }
+    const auto largest = static_cast<double>(std::numeric_limits<Number>::max()); /* of 64 bits, rounded up */
+    if (std::is_integral_v<Number> &&
+        (!(value >= static_cast<double>(std::numeric_limits<Number>::min()) && value <= largest) || value != std::floor(value))) {
+      throw Error(ErrorCode::bad_value, std::string(field.name) + " is out of range");
     }
-    number = static_cast<Number>(value);
+    number = std::is_integral_v<Number> && value == largest ? std::numeric_limits<Number>::max() : static_cast<Number>(value);
     if (!std::isfinite(static_cast<double>(number))) {
       throw Error(ErrorCode::bad_value, std::string(field.name) + " is no finite number");
     }

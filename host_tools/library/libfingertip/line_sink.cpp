@@ -14,8 +14,7 @@ class TextLineSink : public LineSink {
 public:
   explicit TextLineSink(std::unique_ptr<ByteSink> file) : file_(std::move(file)) {}
 
-  void line(const std::string &text) override { torn_line(text + "\n"); }
-  void torn_line(const std::string &text) override { file_->append(text.data(), text.size()); }
+  void line(const std::string &text) override { file_->append((text + "\n").data(), text.size() + 1); }
   void finish() override { file_->finish(); }
   const std::string &path() const override { return file_->path(); }
 

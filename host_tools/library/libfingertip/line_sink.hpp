@@ -16,12 +16,8 @@ public:
   virtual void line(const std::string &text) = 0;
   /* Of an MCAP file, before the first line: wrench, location and pressures of each row. */
   virtual void repeat_every_row() {}
-  /* A last one that has no end. */
-  virtual void torn_line(const std::string &text) = 0;
   /* Last of all. */
   virtual void finish() = 0;
-  /* Of lines that are rows to people and that it keeps as text alone: how many, and what is wrong with the first. */
-  virtual std::string unread_rows() const { return ""; }
   virtual const std::string &path() const = 0;
 };
 

@@ -488,7 +488,8 @@ void Reader::judge(std::uint8_t opcode, std::string_view content, int depth) {
   Fields fields(content);
   if (opcode == SCHEMA) {
     auto id = fields.get<std::uint16_t>();
-    schemas_[id] = fields.text();
+    const std::string_view name = fields.text(); /* "package/msg/Name"; some writers leave the middle out */
+    schemas_[id] = std::string(name.substr(0, name.find('/'))) + std::string(name.substr(std::min(name.rfind('/'), name.size())));
   } else if (opcode == CHANNEL) {
     auto id = fields.get<std::uint16_t>();
     auto schema = fields.get<std::uint16_t>();

@@ -22,12 +22,6 @@ constexpr std::uint64_t PERIOD_ns = 10'000'000;       /* each has the wrench, lo
 constexpr std::size_t WAITING_MOST = 1 << 16;         /* lines for one before them, before it counts as lost: 50 s, 50 MB */
 constexpr std::uint64_t MESSAGE_MOST_bytes = 1 << 20; /* packed by itself */
 
-/* The name in schemas: "fingertip_msgs/msg/Line". */
-static std::string full_name(const std::string &name) {
-  std::size_t slash = name.find('/');
-  return name.substr(0, slash) + "/msg" + name.substr(slash);
-}
-
 /* Parses a time of a recording to ns since 1970. */
 static std::optional<std::uint64_t> utc_ns(const std::string &text) {
   std::tm parts{};
@@ -97,9 +91,7 @@ static std::string serial_in(const std::string &topic) {
   return name.substr(name.size() > 1 && name[0] == 's' && std::isdigit(static_cast<unsigned char>(name[1])) ? 1 : 0);
 }
 
-static mcap::Reader::Message line_message(const ros::Line &line) {
-  return {"/fingertip/lines", full_name(LINE), ros::encode({0, ""}, line), 0};
-}
+static mcap::Reader::Message line_message(const ros::Line &line) { return {"/fingertip/lines", LINE, ros::encode({0, ""}, line), 0}; }
 
 static std::string joint_cells(std::uint32_t device, double time_us) { return std::to_string(device) + "," + fixed(time_us, 1) + ","; }
 
@@ -134,13 +126,9 @@ McapLineSink::McapLineSink(std::unique_ptr<ByteSink> file)
     : file_(std::move(file)),
       writer_([this](const std::string &bytes) { file_->append(bytes.data(), bytes.size()); }, "ros2", "fingertip") {}
 
-void McapLineSink::take(const std::string &text, bool torn) {
-  if (!in_head_) {
-    put(text, torn);
-    return;
-  }
-  head_.emplace_back(text, torn);
-  if (!text.empty() && text[0] != '#') {
+void McapLineSink::line(const std::string &text) {
+  in_head_ ? head_.push_back(text) : put(text);
+  if (in_head_ && !text.empty() && text[0] != '#') {
     begin();
   }
 }
@@ -184,7 +172,7 @@ void McapLineSink::begin() {
   const auto head = std::move(head_);
   head_.clear();
   std::map<std::string, std::string> keys;
-  for (const auto &[text, torn] : head) {
+  for (const std::string &text : head) {
     if (auto pair = key_and_value(text)) {
       keys[pair->first] = pair->second;
     }
@@ -193,7 +181,7 @@ void McapLineSink::begin() {
     const auto found = keys.find(key);
     return found == keys.end() ? std::string() : found->second;
   };
-  joint_ = head[0].first == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
+  joint_ = head[0] == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
   const std::string serials = value(joint_ ? "devices" : "serial");
   for (std::string_view serial : split(serials, joint_ ? ' ' : '\0')) {
     Device &device = devices_.emplace_back();
@@ -206,7 +194,7 @@ void McapLineSink::begin() {
       device_key(*device, own, text);
     }
   }
-  if (auto columns = columns_of(head.back().first, joint_)) {
+  if (auto columns = columns_of(head.back(), joint_)) {
     sensor_count_ = columns->sensor_count;
     sets_ = columns->sets;
     has_rows_ = true;
@@ -216,7 +204,9 @@ void McapLineSink::begin() {
   std::map<std::string, std::uint16_t> schemas;
   for (const char *name :
        {CONTACT, LINE, "geometry_msgs/WrenchStamped", "geometry_msgs/PointStamped", PRESSURES, "diagnostic_msgs/DiagnosticArray"}) {
-    schemas[name] = writer_.schema(full_name(name), "ros2msg", ros::schema_of(name));
+    std::string full_name = name;
+    full_name.insert(full_name.find('/'), "/msg");
+    schemas[name] = writer_.schema(full_name, "ros2msg", ros::schema_of(name));
   }
   auto channel = [&](const std::string &topic, const char *name) {
     return writer_.channel(topic, schemas[name], "cdr", {{"offered_qos_profiles", ""}});
@@ -231,28 +221,25 @@ void McapLineSink::begin() {
     device.place = channel(root + "place", "geometry_msgs/PointStamped");
     device.pressures = channel(root + "pressures", PRESSURES);
   }
-  for (const auto &[text, torn] : head) {
-    put_line(text, torn);
+  for (const std::string &text : head) {
+    put_line(text);
   }
   writer_.end_chunk();
 }
 
-void McapLineSink::put(const std::string &text, bool torn) {
-  if (!torn && text[0] != '#' && !trim(text).empty() && put_row(text)) {
-    return;
-  }
-  put_line(text, torn);
-  if (!torn) {
+void McapLineSink::put(const std::string &text) {
+  if (text[0] == '#' || trim(text).empty() || !put_row(text)) {
+    put_line(text);
     comment(text);
   }
 }
 
-void McapLineSink::put_line(const std::string &text, bool torn) {
+void McapLineSink::put_line(const std::string &text) {
   number_++;
   if (!is_text(text)) {
     throw Error(path() + ": line " + std::to_string(number_) + " is no UTF-8 text, which an MCAP file cannot hold");
   }
-  add(is_periodic(text) ? periodic_lines_ : lines_, ros::encode({clock_.now_ns(), ""}, ros::Line{number_, text, torn}));
+  add(is_periodic(text) ? periodic_lines_ : lines_, ros::encode({clock_.now_ns(), ""}, ros::Line{number_, text}));
 }
 
 /* In order of time, so that no tool changes their order, although rows of several may step back in time. */
@@ -288,10 +275,6 @@ void McapLineSink::comment(const std::string &text) {
   }
 }
 
-std::string McapLineSink::unread_rows() const {
-  return unread_count_ ? std::to_string(unread_count_) + " rows cannot be read, the first in line " + unread_ : "";
-}
-
 /* False if it is none. */
 bool McapLineSink::put_row(const std::string &text) {
   ros::Row row;
@@ -313,8 +296,7 @@ bool McapLineSink::put_row(const std::string &text) {
     RowPackets packets = parse_row(cells, sensor_count_, sets_);
     row.contact = packets.contact;
     row.raw = packets.raw;
-  } catch (const Damage &damage) {
-    unread_ = unread_count_++ ? unread_ : std::to_string(number_ + 1) + ": " + damage.text();
+  } catch (const Damage &) {
     return false;
   }
   row.number = ++number_;
@@ -384,8 +366,8 @@ bool McapLineSource::next(Line &line) {
 }
 
 void McapLineSource::take(mcap::Reader::Message message) {
-  const bool is_contact = message.type == full_name(CONTACT);
-  if (!is_contact && message.type != full_name(LINE)) {
+  const bool is_contact = message.type == CONTACT;
+  if (!is_contact && message.type != LINE) {
     return;
   }
   if (const auto size = mcap::declared_size(message.data)) { /* of a recorder that packs each message */
@@ -393,9 +375,9 @@ void McapLineSource::take(mcap::Reader::Message message) {
     if (!mcap::unpack(message.data, plain)) {
       throw mcap::Damage("a message on " + printable(message.topic) + " cannot be unpacked");
     }
-    message.data = plain;
+    message.data = std::move(plain);
   }
-  if (is_contact && topic_.empty() && !reader_.knows(full_name(LINE))) {
+  if (is_contact && topic_.empty() && !reader_.knows(LINE)) {
     make_head(message);
   }
   if (!begin_ns_) {
@@ -406,7 +388,7 @@ void McapLineSource::take(mcap::Reader::Message message) {
     if (!wanted_s_.is_all()) {
       const auto at = [&](double s) { return shifted_ns(*begin_ns_, s * 1e6); };
       reader_.want(at(wanted_s_.from_s), at(wanted_s_.to_s),
-                   [](const std::string &topic, const std::string &type) { return type == full_name(LINE) && topic != PERIODIC_LINES; });
+                   [](const std::string &topic, const std::string &type) { return type == LINE && topic != PERIODIC_LINES; });
     }
   }
   if (topic_.empty()) {
@@ -414,7 +396,7 @@ void McapLineSource::take(mcap::Reader::Message message) {
     if (reader_.has_left_out()) {
       left_out_until_ = number;
       for (const auto &each : reader_.together()) {
-        const bool is_ours = each.type == full_name(CONTACT) || each.type == full_name(LINE);
+        const bool is_ours = each.type == CONTACT || each.type == LINE;
         left_out_until_ = is_ours ? std::min(left_out_until_, ros::line_number(each.data)) : left_out_until_;
       }
     }
@@ -440,8 +422,7 @@ void McapLineSource::make_head(const mcap::Reader::Message &contact) {
   std::vector<std::string> lines = {std::string(FIRST_WORDS) + FORMAT_OF_ONE, "# serial: " + serial_in(topic_),
                                     "# sensors: " + std::to_string(sensors)};
   const std::string beside = topic_.substr(0, topic_.rfind('/')) + "/pressures"; /* others, of cameras, have this type too */
-  const auto *cloud =
-      find_in(reader_.together(), [&](const auto &each) { return each.type == full_name(PRESSURES) && each.topic == beside; });
+  const auto *cloud = find_in(reader_.together(), [&](const auto &each) { return each.type == PRESSURES && each.topic == beside; });
   for (std::size_t axis = 0; cloud && axis < 2; axis++) {
     lines.push_back(axis == 0 ? "# x_mm:" : "# y_mm:");
     for (double mm : ros::locations_mm(cloud->data, sensors, axis)) {
@@ -457,7 +438,7 @@ void McapLineSource::make_head(const mcap::Reader::Message &contact) {
 
 /* Throws mcap::Damage. */
 LineSource::Line McapLineSource::line_of(std::uint64_t number, const mcap::Reader::Message &message) {
-  if (message.type == full_name(CONTACT)) {
+  if (message.type == CONTACT) {
     auto row = ros::decode_row(message.data);
     if (row && !topic_.empty()) {
       row->time_us.reset(); /* a recording of one */

@@ -40,12 +40,10 @@ public:
   explicit McapLineSink(std::unique_ptr<ByteSink> file);
 
   /* Throws Error also for a line that is no text, which no message can hold. */
-  void line(const std::string &text) override { take(text, false); }
-  void torn_line(const std::string &text) override { take(text, true); }
+  void line(const std::string &text) override;
   void repeat_every_row() override { repeats_every_row_ = true; }
   void finish() override;
   const std::string &path() const override { return file_->path(); }
-  std::string unread_rows() const override;
 
 private:
   struct Device {
@@ -57,10 +55,9 @@ private:
     std::uint64_t period = UINT64_MAX;     /* of the messages that repeat a row */
   };
 
-  void take(const std::string &text, bool torn);
   void begin();
-  void put(const std::string &text, bool torn);
-  void put_line(const std::string &text, bool torn);
+  void put(const std::string &text);
+  void put_line(const std::string &text);
   bool put_row(const std::string &text);
   void comment(const std::string &text);
   void device_key(Device &device, const std::string &key, const std::string &value);
@@ -72,7 +69,7 @@ private:
   mcap::Writer writer_;
   bool repeats_every_row_ = false;
   bool in_head_ = true; /* until the header line */
-  std::vector<std::pair<std::string, bool>> head_;
+  std::vector<std::string> head_;
   std::uint64_t number_ = 0;
   bool joint_ = false;
   std::uint8_t sensor_count_ = 0;
@@ -82,8 +79,6 @@ private:
   std::uint16_t lines_ = 0, periodic_lines_ = 0, diagnostics_ = 0; /* channels */
   LogClock clock_;
   std::uint64_t last_ns_ = 0; /* of the messages */
-  std::uint64_t unread_count_ = 0;
-  std::string unread_; /* the first */
 };
 
 /* The lines in the order of their numbers, in whatever order a tool has written them. A file with the topics of one

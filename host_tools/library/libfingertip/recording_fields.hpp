@@ -180,7 +180,7 @@ inline RowPackets parse_row(std::string_view text, std::uint8_t sensor_count, in
   if (cells.size() != 2 + contact_count + raw_count) {
     const std::size_t columns = 2 + contact_count + raw_count;
     throw Damage{std::to_string(cells.size()) + " columns where the header has " + std::to_string(columns) +
-                 (cells.size() > columns ? "; decimal commas, or more cells?" : "")};
+                 (cells.size() > columns ? "; separators of thousands, decimal commas, or more cells?" : "")};
   }
   auto is_empty = [&](std::size_t from, std::size_t count) {
     return std::all_of(cells.begin() + static_cast<std::ptrdiff_t>(from), cells.begin() + static_cast<std::ptrdiff_t>(from + count),

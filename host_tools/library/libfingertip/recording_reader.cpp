@@ -24,39 +24,49 @@ class Spreadsheet {
 public:
   void restore(LineSource::Line &line) {
     std::string &text = line.text;
-    const std::size_t filled = text.find_last_not_of(",;\t") + 1;
-    fill_ = line.number == 1 ? text.substr(filled, filled < text.size()) : fill_;
     const bool is_quoted = text.rfind("\"#", 0) == 0;
-    is_one_ = is_one_ || (line.number == 1 && (is_quoted || !fill_.empty()));
+    const std::size_t filled = text.find_last_not_of(is_quoted ? ",;\t\"" : ",;\t") + 1;
+    fill_ = line.number == 1 ? text.substr(filled) : fill_;
+    is_one_ = is_one_ || is_quoted || !fill_.empty();
     if (is_quoted || text.rfind('#', 0) == 0) {
-      text.erase(fill_.empty() ? text.size() : text.find_last_not_of(fill_) + 1);
-      text = is_quoted ? text.substr(1, text.size() - 1 - (text.back() == '"')) : text;
+      line.torn = line.torn && (fill_.empty() || text.substr(filled) != fill_);
+      text = text.substr(is_quoted, (is_quoted || !fill_.empty() ? filled : text.size()) - is_quoted);
       for (std::size_t at = 0; is_quoted && (at = text.find("\"\"", at)) != std::string::npos; at++) {
         text.erase(at, 1);
       }
+      if (separator_ != ',' && !is_quoted && text.find(separator_) != std::string::npos) { /* cells, as a grasp's */
+        text = plain(text);
+      }
     } else if (!trim(text).empty() && (commas_ < 0 || is_one_)) {
-      const std::size_t separator = text.find_first_of(";\t");
+      const std::size_t separator = text.find(',') == std::string::npos ? text.find_first_of(";\t") : std::string::npos;
       separator_ = commas_ < 0 && separator != std::string::npos ? text[separator] : separator_;
-      std::string plain;
-      bool is_within = false; /* quotes */
-      for (const char c : text) {
-        is_within = is_within != (c == '"');
-        const bool ends_cell = c == separator_ && !is_within;
-        if (ends_cell || (c != '"' && c != ' ' && c != '\t')) {
-          plain += ends_cell ? ',' : c == ',' ? '.' : c;
-        }
+      std::string row = plain(text);
+      row.erase(std::remove_if(row.begin(), row.end(), [](char c) { return c == ' ' || c == '\t'; }), row.end());
+      const auto commas = [&] { return std::count(row.begin(), row.end(), ','); };
+      while (!row.empty() && row.back() == ',' && (commas() > commas_ || row.find_first_not_of(',') == std::string::npos)) {
+        row.pop_back();
       }
-      const auto commas = [&] { return std::count(plain.begin(), plain.end(), ','); };
-      while (!plain.empty() && plain.back() == ',' && (commas() > commas_ || plain.find_first_not_of(',') == std::string::npos)) {
-        plain.pop_back();
-      }
-      is_one_ = is_one_ || plain != text;
+      is_one_ = is_one_ || row != text;
       commas_ = commas_ < 0 ? commas() : commas_;
-      text = plain;
+      text = row;
     }
   }
 
 private:
+  /* Without quotes, between commas, with decimal points. Commas beside points part thousands, and stay: too many cells. */
+  std::string plain(std::string_view text) const {
+    const char comma = text.find('.') == std::string::npos ? '.' : ',';
+    std::string found;
+    bool is_within = false; /* quotes */
+    for (const char c : text) {
+      is_within = is_within != (c == '"');
+      if (c != '"') {
+        found += c == separator_ && !is_within ? ',' : c == ',' ? comma : c;
+      }
+    }
+    return found;
+  }
+
   std::string fill_;           /* what ends the first line */
   char separator_ = ',';       /* between the header's cells */
   std::ptrdiff_t commas_ = -1; /* of the header, once it was there */
@@ -241,6 +251,7 @@ void refuse_others(const std::string &path, std::string_view start) {
       {"\xff\xfe", UTF_16},
       {"\xfe\xff", UTF_16},
       {std::string_view("#\0", 2), UTF_16},
+      {std::string_view("\0#", 2), UTF_16},
   };
   for (const auto &[begin, what] : OTHERS) {
     if (start.substr(0, begin.size()) == begin) {
@@ -304,6 +315,7 @@ void RecordingReader::begin() {
   }
   state_.line_number = 1;
   joint_ = format_of(path_, first.text) == FORMAT_OF_SEVERAL;
+  on_line_(first, true);
   begun_ = true;
 }
 
@@ -362,8 +374,10 @@ bool RecordingReader::read_next() {
       line.text.pop_back(); /* of an MCAP file that was made of an editor's */
     }
     read_line(line.text);
+    on_line_(line, true);
   } catch (const Damage &damage) {
     damaged(place() + damage.text(), 1);
+    on_line_(line, false);
   }
   return true;
 }
@@ -373,14 +387,14 @@ void RecordingReader::read_line(const std::string &text) {
     return;
   }
   if (text[0] == '#') {
-    read_comment(text);
+    read_comment(std::string(trim(text)));
   } else if (state_.header_seen && joint_) {
     std::size_t time = text.find(',');
     std::size_t rest = time == std::string::npos ? time : text.find(',', time + 1);
     if (rest == std::string::npos) {
       throw Damage{"neither a comment nor a row"};
     }
-    if (auto device = device_of(std::string_view(text).substr(0, time))) {
+    if (auto device = device_of(std::string_view(text).substr(0, time), true)) {
       auto time_us = to_double(std::string_view(text).substr(time + 1, rest - time - 1));
       if (!time_us) {
         throw Damage{"time_us is no number"};
@@ -392,7 +406,7 @@ void RecordingReader::read_line(const std::string &text) {
   } else {
     const auto columns = columns_of(text, joint_);
     if (!columns || (joint_ && devices_.empty())) {
-      throw Damage{"unknown header"};
+      throw Damage{"unknown header: columns moved, renamed, missing, or added?"};
     }
     sensor_count_ = columns->sensor_count;
     sets_ = columns->sets;
@@ -400,11 +414,11 @@ void RecordingReader::read_line(const std::string &text) {
   }
 }
 
-/* Nothing for one that is not wanted. Throws Damage for one that is not in the file. */
-std::optional<std::uint32_t> RecordingReader::device_of(std::string_view number) const {
+/* Nothing for one that is not wanted. Throws Damage for one that is not in the file, of a comment only where all are read. */
+std::optional<std::uint32_t> RecordingReader::device_of(std::string_view number, bool is_row) const {
   auto device = to_u64(number);
   if (!device || *device >= devices_.size() || std::to_string(*device) != number) {
-    if (all_) {
+    if (all_ || is_row) {
       throw Damage{"there is no fingertip \"" + std::string(number) + "\""};
     }
     return std::nullopt;
@@ -419,6 +433,10 @@ void RecordingReader::read_comment(const std::string &text) {
   }
   std::size_t colon = text.find(": ");
   if (colon == std::string::npos) {
+    constexpr const char *ERRORS[] = {"#N/A,", "#VALUE!,", "#REF!,", "#NAME?,", "#NUM!,", "#DIV/0!,"};
+    if (find_in(ERRORS, [&](const char *error) { return text.rfind(error, 0) == 0; })) {
+      throw Damage{"a spreadsheet's error in place of a number"};
+    }
     return; /* a person's note */
   }
   std::string key(trim(std::string_view(text).substr(1, colon - 1)));

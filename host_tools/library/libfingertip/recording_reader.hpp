@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -44,6 +45,9 @@ public:
 
   /* Nothing at the end of the file. */
   std::optional<Item> next();
+  /* Called for each line that next meets; is_read: false where it is damaged, and skipped. */
+  using OnLine = std::function<void(const LineSource::Line &line, bool is_read)>;
+  void set_on_line(OnLine on_line) { on_line_ = std::move(on_line); }
 
   /* The position of reading, to go back to. */
   struct State {
@@ -78,12 +82,13 @@ private:
   void choose_device(const std::string &serials);
   void read_end(std::string_view text);
   void read_info_field(wire_info &info, const std::string &key, const std::string &value);
-  std::optional<std::uint32_t> device_of(std::string_view number) const;
+  std::optional<std::uint32_t> device_of(std::string_view number, bool is_row = false) const;
   friend std::vector<std::string> fingertips_in(const std::string &path);
 
   std::string path_;
   bool salvage_;
   std::unique_ptr<LineSource> source_;
+  OnLine on_line_ = [](const LineSource::Line &, bool) {};
   State state_;
   std::optional<LineStatistics> end_statistics_;
   Metadata recorder_metadata_;

@@ -281,10 +281,9 @@ std::string health(const Header &header, const std::string &serial, unsigned sen
     missing += present >> k & 1 ? "" : " " + std::to_string(k);
     damaged += bad >> k & 1 ? " " + std::to_string(k) : "";
   }
-  std::string trouble = missing.empty() ? "" : "sensors missing:" + missing;
-  if (!damaged.empty()) {
-    trouble += (trouble.empty() ? "" : "; ") + ("damaged PROM of sensors:" + damaged);
-  }
+  missing = missing.empty() ? "" : "sensors missing:" + missing;
+  damaged = damaged.empty() ? "" : "damaged PROM of sensors:" + damaged;
+  const std::string trouble = joined(std::vector{missing, damaged}, "; ");
   return status(header, "fingertip " + serial, trouble, "all sensors are there", serial, fields);
 }
 

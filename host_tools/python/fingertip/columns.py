@@ -63,7 +63,7 @@ class Columns(Mapping[str, Array]):
         block: list[Any] = []
         for values, low, high in zip(whole, whole.min(axis=1).tolist(), whole.max(axis=1).tolist()):
             least, most = (float(np.fmin.reduce(values)), float(np.fmax.reduce(values))) if np.isnan(low) else (low, high)
-            if most - least < _NARROW and block:
+            if most - least < _NARROW and least - 1 < least and block:
                 far = (np.nan_to_num(values - (least - 1)) if np.isnan(low) else values - (least - 1)).astype("<u4")  # from 1; 0 is a gap
                 width = (int(most - least + 1).bit_length() + 7) // 8
                 block.append((least - 1, far.view(np.uint8).reshape(-1, 4)[: 1 if low == high else None, :width].copy()))

@@ -33,7 +33,7 @@ from .errors import InputError
 from .frames import Edge, frame_of
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
 from .mcap_recording import MAGIC, Contacts, Damaged, Line, LogClock, McapLineReader, Skipped
-from .recorded import OF_SPREADSHEETS, Rows, counts_of, judge_key, packet_of, restored
+from .recorded import JOINT_COLUMNS, OF_SPREADSHEETS, UNKNOWN_HEADER, Rows, counts_of, judge_key, packet_of, restored
 
 if TYPE_CHECKING:
     import pandas
@@ -313,7 +313,6 @@ WORTH_WAITING_bytes = 10_000_000
 LATE_s = 1.0  # a row may come behind later ones by less than this
 HEADER_WITHIN_bytes = 200_000  # of a recording that a spreadsheet has saved
 BLOCK_bytes, ROWS_AT_ONCE = 500_000, 1024  # about the same; more take no less time each
-JOINT_COLUMNS = "device,time_us,"
 
 
 # What may hold a recording: how it begins, and what makes a file of it that is read.
@@ -325,7 +324,7 @@ _OTHERS = {
     b"\xfd7zXZ": "packed as a whole by xz: unxz FILE",
     b"PK\3\4": "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV",
     b"SQLite format 3": "a bag of ROS 2 in SQLite; ros2 bag convert makes one in MCAP, packed as it is now",
-    **dict.fromkeys((b"\xff\xfe", b"\xfe\xff", b"#\0"), "text in UTF-16, an editor's or a spreadsheet's; save it as UTF-8"),
+    **dict.fromkeys((b"\xff\xfe", b"\xfe\xff", b"#\0", b"\0#"), "text in UTF-16, an editor's or a spreadsheet's; save it as UTF-8"),
 }
 
 
@@ -445,7 +444,7 @@ class _Reading:
         self.wanted: list[int] = []
         self.columns: Columns | None = None
         self.waits: list[tuple[int, str, float]] = []  # rows of a joint recording, or of MCAP: line, text, time_us
-        self.sensors = self.info_sensors = 0
+        self.sensors = self.info_sensors = self.devices = 0
         self.has_info = False
 
     def line(self, number: int, text: str) -> None:
@@ -453,7 +452,7 @@ class _Reading:
         if not text.strip(" \t\r"):
             return
         if text.startswith("#"):
-            self._comment(number, text)
+            self._comment(number, text.rstrip(" \t\r"))
         elif self.rows is None:
             self._header(text)
         elif not self.is_joint:
@@ -462,13 +461,15 @@ class _Reading:
             cells = text.split(",", 2)
             if len(cells) < 3:
                 raise ValueError("neither a comment nor a row of this recording")
+            if cells[0] not in map(str, range(self.devices)):
+                raise ValueError(f'no number of a fingertip: "{cells[0]}"')
             if cells[0] == str(self.number):
                 self.waits.append((number, cells[2], recorded.number("time_us", cells[1])))
 
     def _header(self, text: str) -> None:
         if self.is_joint:
             if not text.startswith(JOINT_COLUMNS) or self.number is None:
-                raise ValueError("unknown header")
+                raise ValueError(UNKNOWN_HEADER)
             text = text.removeprefix(JOINT_COLUMNS)
         self.rows = Rows(text)
         self.clock = LogClock(self.metadata)
@@ -537,6 +538,8 @@ class _Reading:
             raise ValueError("another recording begins; take the file apart there")
         key, separator, value = text[1:].partition(": ")
         if not separator:
+            if text.startswith(("#N/A,", "#VALUE!,", "#REF!,", "#NAME?,", "#NUM!,", "#DIV/0!,")):
+                raise ValueError("a spreadsheet's error in place of a number")
             return  # a person's note
         key = key.strip(" \t\r")
         if self.is_joint and "/" in key:
@@ -550,6 +553,7 @@ class _Reading:
             raise ValueError("a packet without a fingertip's number")
         elif self.is_joint and key == "devices":
             self.number, self.has_info, self.info_sensors = _choose_device(self.path, value.split(), self.serial), False, 0
+            self.devices = len(value.split())
         if key == "end":
             counts = dict(pair.split("=", 1) for pair in value.split(" ") if "=" in pair) if self.is_joint else counts_of(value)
             self.end = {**counts, **self.own_end}
@@ -639,7 +643,7 @@ def read_recording(
             damaged(each, 0)  # the next one's number shows how many lines are lost
         elif isinstance(each, Contacts):
             assert reading.rows is not None
-            for found in lines.mcap.tables(each, reading.rows):
+            for found in lines.mcap.tables(each, reading.rows, reading.devices):
                 if isinstance(found, Damaged):
                     damaged(found, 0)
                 else:

@@ -488,19 +488,15 @@ class McapLineReader:
         if compression == b"lz4":
             data = self._mcap.stream_reader.lz4.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
         elif compression:
-            zstandard = self._mcap.stream_reader.zstandard
-            if zstandard.frame_content_size(data) not in (-1, size):
-                raise ValueError("its length is wrong")
-            data = zstandard.ZstdDecompressor().decompress(data, max_output_size=size)
+            data = self._unzstd(data, size)
         if len(data) != size or (crc and zlib.crc32(data) != crc):
             raise ValueError("its length or CRC is wrong")
         return data
 
-    def _unpacked(self, message: bytes) -> bytes:
-        """Of a recorder that packs each message; any other as it is. Raises what zstandard raises."""
-        if message[:4] != _ZSTD:
-            return message
-        found: bytes = self._mcap.stream_reader.zstandard.ZstdDecompressor().decompress(message, max_output_size=MESSAGE_MOST_bytes)
+    def _unzstd(self, data: bytes, size: int) -> bytes:
+        """Of frames one after the other; at most one byte more than size."""
+        unpack = self._mcap.stream_reader.zstandard.ZstdDecompressor()
+        found: bytes = unpack.stream_reader(data, read_across_frames=True).read(size + 1)
         return found
 
     def _messages(self, data: bytes) -> list[Line | Contacts | Damaged]:
@@ -523,7 +519,9 @@ class McapLineReader:
                     raise ValueError("its channel is unknown")
                 topic, name = channel
                 if name in (CONTACT_TYPE, LINE_TYPE):
-                    wanted.append((name, topic, self._unpacked(data[begin + 22 : end]), unpack("<Q", data, begin + 6)[0]))
+                    message = data[begin + 22 : end]
+                    message = self._unzstd(message, MESSAGE_MOST_bytes) if message[:4] == _ZSTD else message  # packed by itself
+                    wanted.append((name, topic, message, unpack("<Q", data, begin + 6)[0]))
                 elif name == PRESSURES_TYPE:
                     clouds.setdefault(topic, data[begin + 22 : end])
             elif kind in (_SCHEMA, _CHANNEL):
@@ -609,19 +607,23 @@ class McapLineReader:
             text(end)  # the encoding
             self._channels[number] = topic, self._schemas.get(schema, "")
 
-    def tables(self, contacts: Contacts, rows: Rows) -> "Iterator[tuple[list[int], Array, Array, Array, list[float]] | Damaged]":
+    def tables(
+        self, contacts: Contacts, rows: Rows, device_count: int
+    ) -> "Iterator[tuple[list[int], Array, Array, Array, list[float]] | Damaged]":
         """Numbers, devices, times, columns and log times, and what is damaged among them."""
         lengths = np.array(list(map(len, contacts.data)))
         fine = np.zeros(len(lengths), bool)
         table, devices, times_us = np.empty((len(lengths), len(rows.names))), np.empty(len(lengths)), np.empty(len(lengths))
-        for length in set(lengths.tolist()):
-            at = np.flatnonzero(lengths == length)
+        frame_ids = np.frombuffer(b"".join([data[12:16].ljust(4, b"\xff") for data in contacts.data]), "<u4")  # their lengths
+        for length, frame_id in set(zip(lengths.tolist(), frame_ids.tolist())):
+            at = np.flatnonzero((lengths == length) & (frame_ids == frame_id))
+            if frame_id > length:
+                continue  # torn
             data = b"".join(contacts.data) if len(at) == len(lengths) else b"".join([contacts.data[k] for k in at])
             messages = np.frombuffer(data, np.uint8).reshape(-1, length)[:, 4:]
-            frame_ids = messages[:, 8:12].copy().view("<u4").ravel()
-            layout = _contact_layout(int(frame_ids[0]), rows.sensors)
+            layout = _contact_layout(frame_id, rows.sensors)
             sensors = rows.sensors if _length_of(layout) <= length - 4 else 0
-            layout = layout if sensors else _contact_layout(int(frame_ids[0]), 0)
+            layout = layout if sensors else _contact_layout(frame_id, 0)
             if _length_of(layout) > length - 4:
                 continue  # torn
             padded = np.zeros((len(at), layout.itemsize), np.uint8)
@@ -633,7 +635,8 @@ class McapLineReader:
             devices[at], times_us[at] = found["device"], np.round(found["time_us"], 1)
             whole = length - 4 >= _length_of(layout, ("beyond",))
             fine[at] &= (found["beyond_count"] == 0) | (whole & (found["beyond_count"] == len(MAPS)))
-            fine[at] &= (frame_ids == frame_ids[0]) & (np.isnan(found["time_us"]) != bool(self._is_joint)) & ~np.isinf(found["time_us"])
+            fine[at] &= (np.isnan(found["time_us"]) != bool(self._is_joint)) & ~np.isinf(found["time_us"])
+        fine &= (devices < device_count) | (not self._is_joint)
         numbers = np.array(contacts.numbers, "Q")
         starts = np.flatnonzero(~fine | np.concatenate(([True], ~fine[:-1] | (numbers[1:] - numbers[:-1] != 1))))
         for begin, end in zip(starts.tolist(), [*starts[1:].tolist(), len(fine)]):

@@ -35,7 +35,8 @@ _SCALARS = {
     for name, wire in layout_of(body)
     if wire.code in "BnHIf" and wire.times == 1
 }
-_SCALARS |= {f"calibration_{name}": _SCALARS.pop(name) for name in ("date_s", "placements")}
+_OF_CALIBRATION = [name for name, _ in layout_of(Calibration) if name in _SCALARS and not name.startswith("force_scale")]
+_SCALARS |= {f"calibration_{name}": _SCALARS.pop(name) for name in _OF_CALIBRATION}
 _PACKETS = {
     kind: {"sequence": "H", "t_us": "Q", **{name: wire.code for name, wire in layout_of(body)}}
     for kind, body in (("health", Health), ("ack", Acknowledgement), ("sync", SyncEdge))
@@ -43,28 +44,45 @@ _PACKETS = {
 _PACKETS["info"] = {"sequence": "H", "t_us": "Q"}
 
 
-# A first line, or a header, as spreadsheets save it.
-OF_SPREADSHEETS = re.compile(rb'\A(?:\xef\xbb\xbf)?(?:"|[^\r\n]*[;,\t][\r\n])|^"?(?:t_us|device)(?:[^\r\n]*[;\t" ]|[^\r\n]*,[\r\n])', re.M)
+JOINT_COLUMNS = "device,time_us,"
+UNKNOWN_HEADER = "unknown header: columns moved, renamed, missing, or added?"
+# A first line, a comment or a header, as spreadsheets save it.
+OF_SPREADSHEETS = re.compile(
+    rb'\A(?:\xef\xbb\xbf)?(?:"|[^\r\n]*[;,\t][\r\n])|^"#|^"?(?:t_us|device)(?:[^\r\n]*[;\t" ]|[^\r\n]*,[\r\n])', re.M
+)
+
+
+def _plain(text: str, separator: str) -> str:
+    """Without quotes, between commas, with decimal points. Commas beside points part thousands, and stay: too many cells."""
+    parts = text.split('"')
+    parts[::2] = [part.replace(separator, "\n") for part in parts[::2]]  # outside of quotes
+    return "".join(parts).replace(",", "," if "." in text else ".").replace("\n", ",")
 
 
 def restored(lines: Iterable[str]) -> Iterator[str]:
-    """Lines as they were before a spreadsheet saved them: between semicolons, tabs or commas, with quotes, blanks and decimal commas, and filled
-    up with empty cells."""
-    fill, separator, commas = None, ",", -1
-    for text in (line.rstrip("\r") for line in lines):
-        fill = text[len(text.rstrip(",;\t")) :][:1] if fill is None else fill
-        if text.startswith(("#", '"#')):
-            text = text.rstrip(fill) if fill else text
-            text = text[1:].removesuffix('"').replace('""', '"') if text[0] == '"' else text
+    """Lines as they were before a spreadsheet saved them: between semicolons, tabs or commas, with quotes, blanks and decimal commas, filled
+    up with empty cells. An empty one follows a last line that is whole."""
+    fill, separator, commas, is_whole = "", ",", -1, False
+    for number, text in enumerate(line.rstrip("\r") for line in lines):
+        is_quoted = text.startswith('"#')
+        kept = text.rstrip(',;\t"' if is_quoted else ",;\t")
+        fill, is_whole = text[len(kept) :] if number == 0 else fill, False
+        if is_quoted or text.startswith("#"):
+            is_whole = bool(fill) and text[len(kept) :] == fill
+            if is_quoted:
+                text = kept[1:].replace('""', '"')
+            else:
+                text = kept if fill else text
+                text = _plain(text, separator) if separator != "," and separator in text else text  # cells, as a grasp's
         elif text.strip(" \t\r"):
-            separator = next((c for c in text if c in ";\t"), ",") if commas < 0 else separator
-            parts = text.split('"')
-            parts[::2] = [part.replace(separator, "\n") for part in parts[::2]]  # outside of quotes
-            text = re.sub("[ \t]", "", "".join(parts)).replace(",", ".").replace("\n", ",")
+            separator = next((c for c in text if c in ";\t" and "," not in text), ",") if commas < 0 else separator
+            text = re.sub("[ \t]", "", _plain(text, separator))
             while text.endswith(",") and (text.count(",") > commas or not text.strip(",")):
                 text = text[:-1]
             commas = text.count(",") if commas < 0 else commas
         yield text
+    if is_whole:
+        yield ""
 
 
 def whole(name: str, cell: str, code: str) -> int:
@@ -160,7 +178,7 @@ class Rows:
         pressures = (f"{kind}{k}_Pa" for kind in ("s", "tare") for k in range(self.sensors))
         self.names = ["t_us", "frame", *CONTACT_COLUMNS, *there, *RAW_COLUMNS, *pressures]
         if header != ",".join(self.names) or self.sensors > SENSORS_MAX:
-            raise ValueError("unknown header")
+            raise ValueError(UNKNOWN_HEADER)
         wires = {"sequence": Wire("H"), **dict(layout_of(Contact))}
         contact = [wires[name] for name in self.names[2 : self._first_raw]]
         self._codes = ["Q", "I", *(wire.code for wire in contact), "H", "I", *"Q" * 3, "h", *"i" * 2 * self.sensors]
@@ -247,7 +265,7 @@ class Rows:
         """A row's cells as numbers, NaN where they are empty. Raises ValueError where libfingertip finds no row in it."""
         cells = text.split(",")
         if len(cells) != len(self.names):
-            cause = "; decimal commas, or more cells?" if len(cells) > len(self.names) else ""
+            cause = "; separators of thousands, decimal commas, or more cells?" if len(cells) > len(self.names) else ""
             raise ValueError(f"{len(cells)} columns where the header has {len(self.names)}{cause}")
         first_raw = self._first_raw
         has_contact, has_raw = any(cells[2:first_raw]), any(cells[first_raw:])

@@ -197,11 +197,7 @@ void metadata(Text &text, const std::string &key, const std::string &value) { te
 std::string number(double value) { return shortest(static_cast<float>(value)); }
 
 std::string list(const std::vector<double> &values, double factor, int digits) {
-  std::string text;
-  for (double value : values) {
-    text += (text.empty() ? "" : " ") + fixed(factor * value, digits);
-  }
-  return text;
+  return joined(values, " ", [&](double value) { return fixed(factor * value, digits); });
 }
 
 std::string file_name(const std::string &path) { return std::filesystem::path(path).filename().string(); }

@@ -57,12 +57,11 @@ class TestMcap(unittest.TestCase):
     def test_no_row_is_lost_in_silence(self):
         lines = self.csv.read_bytes().split(b"\n")
         row = next(at for at, line in enumerate(lines) if line[:1].isdigit() and b",," not in line[:40])
-        path, bag = self.folder / "crlf.csv", self.folder / "crlf.mcap"
-        path.write_bytes(b"\xef\xbb\xbf" + b"\r\n".join(lines))
-        self.assertEqual(bags.contents(self.convert(path, "crlf.mcap")), bags.contents(self.convert(self.csv, "lf.mcap")))
+        path, bag = self.folder / "edited.csv", self.folder / "edited.mcap"
         path.write_bytes(b"\n".join([*lines[:row], b"x" + lines[row], *lines[row + 1 :]]))
-        self.assertIn(f"1 rows cannot be read, the first in line {row + 1}: t_us is", self.refused("convert", path, bag, "--overwrite"))
-        self.assertEqual(self.convert(self.convert(path, "x.mcap", "--salvage"), "x.csv").read_bytes(), path.read_bytes())
+        self.assertIn(f"edited.csv:{row + 1}: t_us is", self.refused("convert", path, bag, "--overwrite"))
+        for kept in ("x.mcap", "x.csv"):  # as a note, so that what is converted is read
+            self.assertIn(b"\n# unread: x" + lines[row], self.convert(self.convert(path, kept, "--salvage"), "y.csv").read_bytes())
 
     def test_tool_and_package_write_the_same_of_several(self):
         bags.of_python(self.several_csv, self.folder / "same.mcap")
@@ -70,7 +69,7 @@ class TestMcap(unittest.TestCase):
         self.assertEqual(bags.contents(there), bags.contents(self.folder / "same.mcap"))
         self.assertEqual(self.convert(there, "back.csv").read_bytes(), self.several_csv.read_bytes())
 
-    def test_whatever_an_editor_made_of_a_csv_file_comes_back(self):
+    def test_whatever_an_editor_made_of_a_csv_file_is_converted(self):
         prng = random.Random(5)
         text = self.several_csv.read_bytes()
         for number in range(25):
@@ -82,16 +81,12 @@ class TestMcap(unittest.TestCase):
             path = self.folder / "edited.csv"
             path.write_bytes(data)
             try:
-                data.decode("utf-8")
-            except UnicodeDecodeError:
+                there = read_recording(path, salvage=True, serial="AAAA")
+                bag = self.convert(path, "edited.mcap", "--salvage")
+            except InputError:  # its head is damaged, or it is no UTF-8
                 continue
-            back = self.convert(self.convert(path, "edited.mcap", "--salvage"), "edited_back.csv", "--salvage")
-            lines = [file.read_bytes().replace(b"\r", b"").split(b"\n") for file in (path, back)]
-            changed = [one for one, other in zip(*lines) if one != other]  # rows, to what this tool writes
-            self.assertEqual((len(lines[0]), [line for line in changed if not line[:1].isdigit()]), (len(lines[1]), []), number)
-            if changed:
-                there, here = (read_recording(file, salvage=True, serial="AAAA") for file in (path, back))
-                self.assertEqual(repr((dict(there.columns), there.sensors_Pa)), repr((dict(here.columns), here.sensors_Pa)), number)
+            here = read_recording(self.convert(bag, "edited_back.csv"), serial="AAAA")
+            self.assertEqual(repr((dict(there.columns), there.sensors_Pa)), repr((dict(here.columns), here.sensors_Pa)), number)
         path.write_bytes(text + b"# note: \xff\n")
         self.assertIn("is no UTF-8 text, which an MCAP file cannot hold", self.refused("convert", path, self.folder / "no.mcap"))
 
@@ -131,18 +126,15 @@ class TestMcap(unittest.TestCase):
         self.assertEqual([read_recording(path).metadata["x_mm"] for path in (bag, self.convert(bag, "camera.csv"))], [right, right])
 
     def test_a_torn_recording_is_converted_with_salvage_only(self):
-        torn, uncut = self.folder / "torn.csv", self.folder / "unended.csv"
+        torn = self.folder / "torn.csv"
         lines = self.csv.read_bytes().splitlines(keepends=True)[:-1]
-        uncut.write_bytes(b"".join(lines))
         torn.write_bytes(b"".join(lines)[:-5])
-        short = "no end line: the recording was cut short, its recorder killed or its disk full"
-        for start, said in ((torn, f"{torn}: the last line is torn\n{torn}: {short}\n"), (uncut, f"{uncut}: {short}\n"), (self.csv, "")):
-            if start == torn:
-                refusal = self.refused("convert", torn, self.folder / "none.csv")
-                self.assertIn(f"torn.csv:{len(lines)}: the last line is torn; use --salvage", refusal)
-                self.assertFalse((self.folder / "none.csv").exists())
-            for out in ("out.csv", "out.mcap"):
-                self.assertEqual(bags.call(FINGERTIP, "convert", start, self.folder / out, "--salvage", "--overwrite").stderr, said)
+        refusal = self.refused("convert", torn, self.folder / "none.csv")
+        self.assertIn(f"torn.csv:{len(lines)}: the last line is torn; use --salvage", refusal)
+        self.assertFalse((self.folder / "none.csv").exists())
+        for out in ("out.csv", "out.mcap"):
+            said = bags.call(FINGERTIP, "convert", torn, self.folder / out, "--salvage", "--overwrite").stderr
+            self.assertRegex(said, f"{torn}: 1 damaged lines skipped\n{torn}: no end line: .*\n$")
 
     def test_of_a_killed_recorder_every_written_chunk_is_read(self):
         port, bag = self.folder / "killed_port", self.folder / "killed.mcap"

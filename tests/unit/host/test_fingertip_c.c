@@ -123,7 +123,7 @@ TEST(what_no_packet_may_hold_is_refused_by_its_name) {
                {CONTACT, "frame", 4294967296.0},
                {CONTACT, "frame", -1},
                {CONTACT, "frame", 0.5},
-               {CONTACT, "t_us", 18446744073709551616.0},
+               {CONTACT, "t_us", 18446744073709555712.0},
                {RAW, "pressure_Pa_q10", 2147483648.0},
                {RAW, "sensor_count", 37},
                {RAW, "sensor_count", 0}};

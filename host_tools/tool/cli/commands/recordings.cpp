@@ -115,18 +115,14 @@ Contents contents_of(const Conversion &conversion) {
   return contents;
 }
 
-void report_cut_short(const std::string &path, bool is_cut_short) {
+/* On standard error: damaged lines, a missing end. */
+void report_losses(const std::string &path, Count skipped_lines, bool is_cut_short) {
+  if (skipped_lines > 0) {
+    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", printable(path).c_str(), skipped_lines);
+  }
   if (is_cut_short) {
     std::fprintf(stderr, "%s: no end line: the recording was cut short, its recorder killed or its disk full\n", printable(path).c_str());
   }
-}
-
-/* On standard error: damaged lines, a missing end. */
-void report_losses(const std::string &path, const PacketFile &file) {
-  if (file.skipped_lines() > 0) {
-    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", printable(path).c_str(), static_cast<Count>(file.skipped_lines()));
-  }
-  report_cut_short(path, file.is_cut_short());
 }
 
 std::unique_ptr<LineSink> sink_of(const Conversion &conversion) {
@@ -161,7 +157,7 @@ void convert_packets(const Conversion &conversion) {
     }
   }
   writer.finish({file.statistics()}, "converted");
-  report_losses(conversion.from, file);
+  report_losses(conversion.from, file.skipped_lines(), file.is_cut_short());
   if (contents.left_out > 0) {
     std::fprintf(stderr, "%s: %llu packets are of kinds that recordings leave out\n", printable(conversion.from).c_str(),
                  static_cast<Count>(contents.left_out));
@@ -170,56 +166,26 @@ void convert_packets(const Conversion &conversion) {
               file.statistics().text().c_str());
 }
 
-/* To a recording, line by line: nothing is lost, nothing changed. Throws Error. */
+/* To a recording, line by line: nothing is lost, nothing changed. What is no line of a recording is refused, or kept as a comment. Throws
+ * Error. */
 void convert_lines(const Conversion &conversion) {
-  RecordingReader(conversion.from, true); /* throws for what is none */
-  auto source = within(open_lines(conversion.from), conversion.interval);
+  RecordingReader reader(conversion.from, conversion.salvage, within(open_lines(conversion.from), conversion.interval));
   auto sink = sink_of(conversion);
-  LineSource::Line line;
   Reading reading(conversion.from);
-  std::uint64_t last = 0, count = 0, rows = 0; /* and the header */
-  bool is_ended = false;
-  const auto report_damage = [&](const std::string &what, const std::string &place = "") {
-    if (!conversion.salvage) {
-      throw Error(ErrorCode::damaged_line, conversion.from + place + ": " + what);
-    }
-    std::fprintf(stderr, "%s: %s\n", printable(conversion.from).c_str(), what.c_str());
-  };
-  for (;;) {
-    try {
-      if (!source->next(line)) {
-        break;
-      }
-    } catch (const Error &error) {
-      if (!conversion.salvage || error.code() != ErrorCode::damaged_line) {
-        throw;
-      }
-      std::fprintf(stderr, "%s\n", printable(error.what()).c_str());
-      continue;
-    }
-    if (line.number > last + 1 + line.left_out) {
-      report_damage(std::to_string(line.number - last - 1 - line.left_out) + " lines are lost before line " + std::to_string(line.number));
-    }
-    last = line.number;
+  std::uint64_t count = 0, frames = 0;
+  reader.set_on_line([&](const LineSource::Line &line, bool is_read) {
+    sink->line(is_read ? line.text : "# unread: " + printable(line.text));
     count++;
-    rows += !line.text.empty() && line.text[0] != '#';
-    reading.show([&] { return source->place(); });
-    is_ended = is_ended || (!line.torn && line.text.rfind("# end:", 0) == 0);
-    if (line.torn) {
-      report_damage("the last line is torn", ":" + std::to_string(line.number));
-      sink->torn_line(line.text);
-    } else {
-      sink->line(line.text);
-    }
+    reading.show([&] { return reader.place().in_file; });
+  });
+  while (auto item = reader.next()) {
+    frames += item->kind == RecordingReader::Item::Kind::packet && is_frame(item->packet);
   }
-  if (const std::string unread = sink->unread_rows(); !unread.empty()) {
-    report_damage(unread); /* they are kept as text */
-  }
-  if (!conversion.interval.is_all() && rows < 2) {
+  if (!conversion.interval.is_all() && frames == 0) {
     throw no_frames(conversion.from, conversion.interval);
   }
   sink->finish();
-  report_cut_short(conversion.from, !is_ended);
+  report_losses(conversion.from, reader.skipped_lines(), !reader.has_end());
   std::printf("%s: %llu lines\n", printable(conversion.to).c_str(), static_cast<Count>(count));
 }
 
@@ -237,7 +203,7 @@ void convert_to_capture(const Conversion &conversion) {
     }
   }
   capture.finish();
-  report_losses(conversion.from, file);
+  report_losses(conversion.from, file.skipped_lines(), file.is_cut_short());
   std::printf("%s: %llu packets, without the recorder's own lines\n", printable(conversion.to).c_str(), static_cast<Count>(packets));
 }
 
@@ -317,7 +283,7 @@ int show(const ReplayOptions &options) {
     if (model.frames() == 0 && track.is_ended()) {
       throw no_frames(options.file, options.interval);
     }
-    report_losses(options.file, track.file());
+    report_losses(options.file, track.file().skipped_lines(), track.file().is_cut_short());
     bool several = playback.tracks().size() > 1;
     std::printf("%s: %s%s\n", name.c_str(), several && model.info() ? (text_field(model.info()->serial) + ": ").c_str() : "",
                 summary_text(model).c_str());
