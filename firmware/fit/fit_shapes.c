@@ -142,7 +142,11 @@ enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct f
     follow(pad, fit, state, fit_grid_sum_q20(pad->room.frame.q28));
   }
   if (state->frames == 0) {
-    fit_shapes_begin(pad, fit, state);
+    if (state->part++ == 0) {
+      fit_shapes_begin(pad, fit, state);
+      return FIT_SHAPES_UNFINISHED;
+    }
+    fit_shapes_begin_pair(pad, state);
     forget(state, result);
     state->frames = 1;
     return FIT_SHAPES_ANSWERED;

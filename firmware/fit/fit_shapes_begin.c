@@ -19,7 +19,7 @@ static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad, stru
   for (int k = 1; k < NODES; k++) {
     first = readings->q14[k] > readings->q14[first] ? k : first;
   }
-  int32_t height_q14 = terms.h_q14[0] + terms.h_q14[1];
+  int32_t height_q14 = terms.h_q14[0] + terms.h_q14[1], peak_q14 = port_divide(readings->q14[first] << 14, height_q14);
   struct squares squares;
   struct bell narrow, wide;
   fit_shapes_set_squares((first / ROWS - COLUMNS / 2) * 4096, (first % ROWS - ROWS / 2) * 4096, &squares);
@@ -29,7 +29,7 @@ static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad, stru
     int32_t e_q15 = (narrow.x_q15[k / ROWS] * narrow.y_q15[k % ROWS]) >> 15;
     int32_t wide_q15 = (wide.x_q15[k / ROWS] * wide.y_q15[k % ROWS]) >> 15;
     int32_t s_q14 = (terms.h_q14[0] * e_q15 + terms.h_q14[1] * wide_q15) >> 15;
-    int32_t left = readings->q14[k] - port_divide(readings->q14[first] * s_q14, height_q14);
+    int32_t left = readings->q14[k] - ((peak_q14 * s_q14) >> 14);
     if (left > most) {
       most = left;
       second = k;
@@ -59,7 +59,7 @@ static NOINLINE int32_t residuals_at(struct fit_shapes_pad *pad, struct fit_shap
   return sum_q16;
 }
 
-void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, struct fit_shapes_state *state) {
+void fit_shapes_begin(const struct fit_shapes_pad *pad, const struct fit_result *fit, struct fit_shapes_state *state) {
   const float per = pad->per_pitch;
   struct fit_shapes_at at = {{0}};
   float variance = fit->sigma_mm * fit->sigma_mm * per * per;
@@ -93,9 +93,15 @@ void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, 
   at.value[SPAN_X] = pitches_q20(line * along_x);
   at.value[SPAN_Y] = pitches_q20(line * along_y);
   state->at[LONG] = at;
-  struct fit_shapes_at pair = at;
-  set_pair_by_readings(pad, &pair);
   at.value[SPAN_X] = pitches_q20(reach * along_x);
   at.value[SPAN_Y] = pitches_q20(reach * along_y);
-  state->at[TWO] = residuals_at(pad, &pair) < residuals_at(pad, &at) ? pair : at;
+  state->at[TWO] = at;
+}
+
+void fit_shapes_begin_pair(struct fit_shapes_pad *pad, struct fit_shapes_state *state) {
+  struct fit_shapes_at pair = state->at[LONG];
+  set_pair_by_readings(pad, &pair);
+  if (residuals_at(pad, &pair) < residuals_at(pad, &state->at[TWO])) {
+    state->at[TWO] = pair;
+  }
 }

@@ -70,8 +70,9 @@ static inline int32_t fit_shapes_span_square(const int32_t *at) {
   return x_q10 * x_q10 + y_q10 * y_q10;
 }
 
-/* fit_shapes_begin.c */
-void fit_shapes_begin(struct fit_shapes_pad *pad, const struct fit_result *fit, struct fit_shapes_state *state);
+/* fit_shapes_begin.c: all models by the Gaussian, and then the pair by the readings if that leaves less. */
+void fit_shapes_begin(const struct fit_shapes_pad *pad, const struct fit_result *fit, struct fit_shapes_state *state);
+void fit_shapes_begin_pair(struct fit_shapes_pad *pad, struct fit_shapes_state *state);
 
 /* fit_shapes_step.c. The column of the residuals, and the sum of the squares with those of the priors; chi^2 of both,
  * Q8; and after these, of the model's rows, one damped step, or the factors of the matrix that answers. */
