@@ -72,7 +72,6 @@ def second_core(build):
     jobs |= {seed: functools.partial(one, "soak", KILLING_h / CHIPS, seed) for seed in range(1, CHIPS + 1)}
     found = in_parallel(jobs)
     killed = found.pop("kills") | found.pop("absent")
-    rows, others = ([row for row in all_rows if (row["kind"] == "step") == is_step] for is_step in (True, False))
     total = {name: sum(chip[name] for chip in found.values()) for name in found[1]}
     return killed | {
         "core1_soak_chips": CHIPS,
@@ -138,6 +137,7 @@ def undefined(build):
 def dips(build):
     """Supplies of 1 to 15 sensors that dip amid a press: 16 phases of a frame, six shares of the true codes, both boards."""
     *all_rows, other_range = map(json.loads, re.findall(r"(?m)^{.*}$", run("env", "DIPS=1 1", build / "tests/unit/app/test_app_dips")))
+    rows, others = ([row for row in all_rows if (row["kind"] == "step") == is_step] for is_step in (True, False))
     total = {name: sum(row[name] for row in rows) for name in ("wrong_unflagged_frames", "false_slips", "raw_valid_wrong", "never_trusted")}
     cases, reset_ms = (how(row[name] for row in rows) for how, name in ((sum, "cases"), (max, "reset_ms_max")))
     wrong = sum(row["wrong_unflagged_frames"] + row["false_slips"] for row in others)
