@@ -1,18 +1,19 @@
 /* From codes to readings, and which of them to believe. Main context; no bus, and no time but the frame's.
  *
- * Temperatures. One that differs from the sensor's last by more than a pad warms meanwhile (step_max_cC) is not used. The
- * last one stays in use, the sensor is doubtful, and the next one is asked for at once: each degree is worth some 240 Pa.
- * Two of them that agree come from a sensor that has lost its state as its supply failed. It becomes a suspect. The first
+ * Temperatures. A value follows each sensor's, no faster than a pad warms (warmed_cC). A temperature that is READINGS_MOVED_cC from it is
+ * not used, so that a supply that sags slowly is found as well. The last one stays in use, the sensor is doubtful, and the next one is
+ * asked for at once: each degree is worth some 240 Pa. Two of them that agree come from a sensor that has lost its state, whatever the
+ * others do. So does one after a jolt (see Moves). The sensor becomes a suspect. The first
  * temperature of a sensor must be near the others', but after a reset near its own last: it may have lost its state
  * again, and so may most others (supplies that dip once do so twice). If resets do not help for a second, and it reports
  * the same twice, it is believed. Far from the others' it stays doubtful.
  *
  * Moves. A sensor whose supply dips may go on with codes that are off, at once or ever more: 1 % of a code is 2.6 kPa
- * and 2.7 degC. So only a temperature vouches for pressures that have moved: by READINGS_MOVED_Pa, all sensors together,
- * since the last temperature, or one of them by READINGS_JOLT_Pa_q10 at once. They are used, but all of them are doubtful until the
- * next temperature, which is asked for at once. So they are when one has lost its admission. A sensor whose temperature has
- * moved too, by READINGS_MOVED_cC, is a suspect, whatever the others do: after such a jolt at once. While one moves by less, or a code is
- * that of the frame before, the doubt lasts.
+ * and 2.7 degC. So only a temperature vouches for pressures that have moved. It is asked for once all sensors together have moved by
+ * half of READINGS_MOVED_Pa since the last one. If it comes too late, they are used, but all of them are doubtful until it comes. So they
+ * are when one of them moves by READINGS_JOLT_Pa_q10 at once, or has lost its admission. While a temperature moves by half of
+ * READINGS_MOVED_cC, or a code is that of the frame before, the doubt lasts. Codes that are off while the temperature's are right look
+ * like a force: only the fit's residual shows them.
  *
  * Pressures. A pressure below zero is left out. A second in a row makes the sensor a suspect. A large step of one
  * sensor alone is left out as well, since rubber passes any press on to its neighbours. If the next reading is back,
@@ -55,15 +56,18 @@
 #define READINGS_MOVED_Pa (MS58XX_STEP_Pa / 2)
 /* A hand warms a pad whose temperature stood still by 0.2 degC within the longest interval of temperatures. */
 #define READINGS_MOVED_cC 25
-/* From one temperature to the next that a move asks for: each takes the place of a frame, and two more are doubtful. */
+/* From one temperature to the next that a move asks for, on the average: each takes the place of a frame. After a rest some follow each
+ * other. It is asked for early enough to come in time. */
 #define READINGS_MOVED_FRAMES 32
+#define READINGS_FRAMES_MAX (4 * READINGS_MOVED_FRAMES)
+#define READINGS_ASK_FRAMES (READINGS_MOVED_FRAMES - 3)
 #define READINGS_ALONE 256
 #define READINGS_APART_Pa_q10 (FT_APART_MAX_Pa * 1024)
 
 struct readings {
   bool presses_are_shared; /* see scan_settings */
   uint8_t newest;
-  int16_t temperature_cC; /* mean of the sensors admitted, the last one if there is none */
+  int16_t temperature_cC; /* mean of the last that were used */
   uint8_t doubts_in_a_row;
   sensor_map has_thermal; /* bitmap */
   sensor_map renewed;     /* bitmap: another sensor since the last frame */
@@ -80,7 +84,8 @@ struct readings {
   sensor_map still;       /* bitmap: the code is that of the frame before. Set by the caller */
   bool jolted;            /* at once: set by the caller, too */
   bool moved;             /* all are doubtful until their temperature shows that they kept their state */
-  uint8_t frames;         /* since the last temperature, up to READINGS_MOVED_FRAMES */
+  bool asks;              /* the next temperature is wanted at once */
+  uint8_t frames;         /* not used up by temperatures, READINGS_MOVED_FRAMES each */
   sensor_map was_low;     /* bitmap: the last pressure was below zero */
   sensor_map alone;       /* bitmap of one sensor: its last pressure stepped alone */
   sensor_map suspects;    /* bitmap: want a reset */
@@ -92,6 +97,7 @@ struct readings {
   sensor_map apart;       /* bitmap: see readings_doubt() */
   struct ms58xx_thermal thermal[FT_MAX_SENSORS];
   int32_t doubted_cC[FT_MAX_SENSORS];     /* [sensor] the temperature that was not used */
+  int32_t steady_cC[FT_MAX_SENSORS];      /* [sensor] follows its temperature, as fast as a pad warms */
   int32_t vouched_Pa_q10[FT_MAX_SENSORS]; /* [sensor] the last that counted when the last temperature came */
   int32_t last_Pa_q10[2][FT_MAX_SENSORS]; /* [newest][sensor] the last that counted */
 };
@@ -105,7 +111,7 @@ struct readings_temperature {
   sensor_map returned;            /* bitmap: was reset, perhaps after long */
   sensor_map prom_bad;            /* bitmap: the CRC differs */
   sensor_map admitted;            /* bitmap */
-  int32_t step_max_cC;            /* by which a temperature may differ from the one before, after this time */
+  int32_t warmed_cC;              /* most by which a pad warms in the time since the one before */
   bool is_soon;                   /* after the one before: nothing was away for long */
   bool is_patient;                /* resets have not helped for a second */
 };

@@ -9,8 +9,6 @@
 /* After a temperature reading that a sensor missed. */
 #define TEMPERATURE_RETRY_us 100000u
 #define TEMPERATURE_AT_ONCE_us 1u
-/* More than the longest interval: the sensors may have warmed by more than usual. A hand warms them by 0.1 degC/s. */
-#define TEMPERATURE_LATE_us 3000000u
 /* How soon a temperature that was not taken is tried again. */
 #define SLOT_POLL_us 1000u
 /* How soon a new rate is noticed while waiting for the next frame of the old one. */
@@ -490,7 +488,6 @@ static void adapt_interval(struct scan *scan, uint32_t news) {
 
 static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
   const uint32_t apart_us = (uint32_t)(slot->conversion.t_us - scan->temperature_us);
-  const int32_t warmed_cC = (int32_t)(10u + (apart_us >> 14)); /* six times what a hand warms, and noise */
   const struct readings_temperature taken = {
       .prom = scan->bring_up.prom,
       .code = slot->code,
@@ -499,9 +496,7 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
       .returned = slot->returned,
       .prom_bad = scan_read_map(&scan->prom_bad),
       .admitted = scan_read_map(&scan->admitted),
-      .step_max_cC = apart_us > TEMPERATURE_LATE_us                 ? READINGS_TEMPERATURE_NEAR_cC
-                     : warmed_cC < READINGS_TEMPERATURE_STEP_MAX_cC ? warmed_cC
-                                                                    : READINGS_TEMPERATURE_STEP_MAX_cC,
+      .warmed_cC = (int32_t)(apart_us >> 15), /* three times what a hand warms */
       .is_soon = TEMPERATURE_INTERVAL_us > apart_us,
       .is_patient = scan->bring_up.interval_us > 1000000u,
   };
@@ -566,13 +561,13 @@ bool scan_take(struct scan *scan, struct frame *frame) {
   }
   fill_head(scan, &scan->slot.conversion, frame);
   struct readings *readings = &scan->readings;
-  const bool moved = readings->moved;
+  const bool asked = readings->asks;
   readings->jolted = readings->jolted || (scan->slot.zero | (readings->counted & ~scan_read_map(&scan->admitted))) != 0;
   readings->still = scan->slot.still;
   if (readings_take_pressures(readings, scan->slot.code, scan->slot.good, frame)) {
     report(scan);
   }
-  if (readings->moved && !moved) {
+  if (readings->asks && !asked) {
     set(&scan->temperature_within_us, TEMPERATURE_AT_ONCE_us);
   }
   hand_over(&scan->slot_state, SCAN_SLOT_EMPTY);

@@ -22,7 +22,7 @@
  *
  * Temperatures are converted twice a second, less often while they are constant. Where the requested rate leaves a
  * pause, that is done in the pause before a frame. Otherwise it takes the place of a frame, at most one in 600 at OSR
- * 256 and one in 25 at OSR 8192, and one in 33 while pressures move (readings.h). That frame goes out at its time too, with the pressures
+ * 256 and one in 25 at OSR 8192, and one in 32 while pressures move (readings.h). That frame goes out at its time too, with the pressures
  * of the one before, and marked as held. All ones are no reading. A sensor's last temperature is forgotten when it is admitted again. Its
  * next temperature is the next conversion. */
 #pragma once

@@ -17,22 +17,20 @@
 
 static bool within(int32_t value, int32_t limit) { return value >= -limit && value <= limit; }
 
-/* Of the temperatures of the array now, or NO_MIDDLE. */
-static int32_t find_middle(const struct readings *readings, uint8_t sensor_count, sensor_map good, const int32_t now_cC[]) {
+/* The median, or NO_MIDDLE. */
+static int32_t find_middle(const int32_t value[], sensor_map which) {
   int32_t values[FT_MAX_SENSORS];
   int count = 0;
-  for (uint8_t k = 0; k < sensor_count; k++) {
-    if (readings->has_thermal & sensor_bit(k)) {
-      values[count++] = readings->thermal[k].first_order_cC;
-    } else if (good & sensor_bit(k)) {
-      values[count++] = now_cC[k];
+  for (; which; which >>= 1, value++) {
+    if (which & 1u) {
+      values[count++] = *value;
     }
   }
   return count >= VOTERS_MIN ? apart_median(values, count) : NO_MIDDLE;
 }
 
-/* Whether to use a temperature that something speaks against. */
-static bool settle(struct readings *readings, uint8_t k, int32_t now_cC, int32_t middle_cC, int32_t most_cC) {
+/* Whether to use a temperature. */
+static bool settle(struct readings *readings, uint8_t k, int32_t now_cC, int32_t middle_cC, int32_t warmed_cC) {
   sensor_map bit = sensor_bit(k);
   bool possible = now_cC >= TEMPERATURE_MIN_cC && now_cC <= TEMPERATURE_MAX_cC;
   bool near = possible && (middle_cC == NO_MIDDLE || within(now_cC - middle_cC, READINGS_TEMPERATURE_NEAR_cC));
@@ -45,9 +43,12 @@ static bool settle(struct readings *readings, uint8_t k, int32_t now_cC, int32_t
     use = possible && (kept || (agrees && pardoned));
     insists = !use && (agrees || (known && !pardoned));
   } else {
-    use = within(now_cC - readings->thermal[k].first_order_cC, most_cC);
+    const int32_t off_cC = now_cC - readings->steady_cC[k];
+    const int32_t beyond_cC = within(off_cC, warmed_cC) ? 0 : off_cC < 0 ? off_cC + warmed_cC : off_cC - warmed_cC;
+    use = within(beyond_cC, READINGS_MOVED_cC);
+    readings->steady_cC[k] = use ? now_cC - beyond_cC : readings->steady_cC[k];
     insists = !use && (agrees || readings->jolted);
-    readings->has_last &= insists && readings->moved ? ~bit : ~(sensor_map)0; /* no evidence any more */
+    readings->has_last &= insists && readings->asks ? ~bit : ~(sensor_map)0; /* no evidence any more */
   }
   if (!use) {
     readings->suspects |= insists ? bit : 0;
@@ -81,19 +82,11 @@ static void forget(struct readings *readings, const struct readings_temperature 
 /* Sensors whose PROM has a wrong CRC against the middle of all. */
 static void prove(struct readings *readings, uint8_t sensor_count) {
   const int32_t *last_Pa_q10 = readings->last_Pa_q10[readings->newest];
-  int32_t values[FT_MAX_SENSORS];
-  int count = 0;
-  for (uint8_t k = 0; k < sensor_count; k++) {
-    if (readings->has_last & sensor_bit(k)) {
-      values[count++] = last_Pa_q10[k] / 2;
-    }
-  }
   sensor_map near = 0;
-  const int32_t middle = count > 0 ? apart_median(values, count) : 0;
+  const int32_t middle_Pa_q10 = find_middle(last_Pa_q10, readings->has_last);
   for (uint8_t k = 0; k < sensor_count; k++) {
-    const sensor_map bit = readings->unproven & readings->has_last & sensor_bit(k);
-    if (bit && within(last_Pa_q10[k] / 2 - middle, READINGS_APART_Pa_q10 / 2)) {
-      near |= bit;
+    if (middle_Pa_q10 == NO_MIDDLE || within(last_Pa_q10[k] - middle_Pa_q10, READINGS_APART_Pa_q10)) {
+      near |= readings->unproven & readings->has_last & sensor_bit(k);
     }
   }
   readings->unproven &= ~(near & readings->was_near);
@@ -101,33 +94,15 @@ static void prove(struct readings *readings, uint8_t sensor_count) {
 }
 
 /* Returns the bitmap of those apart that have not read like the others yet. Later they may be apart, as something warm may touch some. */
-static sensor_map compare(struct readings *readings, uint8_t sensor_count) {
-  if ((readings->has_thermal & ~readings->alike) == 0) {
+static sensor_map compare(struct readings *readings, uint8_t sensor_count, sensor_map used, const int32_t now_cC[]) {
+  if ((used & ~readings->alike) == 0) {
     return 0;
   }
-  int32_t values[FT_MAX_SENSORS];
-  for (uint8_t k = 0; k < sensor_count; k++) {
-    values[k] = readings->thermal[k].first_order_cC;
-  }
-  const sensor_map apart = apart_find(values, readings->has_thermal, sensor_count, READINGS_TEMPERATURE_APART_cC);
-  const sensor_map like = readings->has_thermal & ~apart;
+  const sensor_map apart = apart_find(now_cC, used, sensor_count, READINGS_TEMPERATURE_APART_cC);
+  const sensor_map like = used & ~apart;
   readings->alike |= like & readings->was_alike;
   readings->was_alike = like;
   return apart & ~readings->alike;
-}
-
-static void average(struct readings *readings, uint8_t sensor_count, sensor_map admitted) {
-  int32_t sum_cC = 0;
-  int32_t sensors = 0;
-  for (uint8_t k = 0; k < sensor_count; k++) {
-    if (readings->has_thermal & admitted & sensor_bit(k)) {
-      sum_cC += readings->thermal[k].temperature_cC;
-      sensors++;
-    }
-  }
-  if (sensors > 0) {
-    readings->temperature_cC = (int16_t)port_divide(sum_cC, sensors);
-  }
 }
 
 uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_count, const struct readings_temperature *taken) {
@@ -142,40 +117,41 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
   for (uint8_t k = 0; k < sensor_count; k++) {
     now_cC[k] = ms58xx_first_order_cC(&taken->prom[k], taken->code[k]);
   }
-  const bool moved = readings->moved;
-  const int32_t step_max_cC = taken->step_max_cC; /* more than usual after long */
-  const bool is_less = moved && step_max_cC > READINGS_MOVED_cC && step_max_cC <= READINGS_TEMPERATURE_STEP_MAX_cC;
-  const int32_t most_cC = is_less ? READINGS_MOVED_cC : step_max_cC;
-  const int32_t middle_cC = find_middle(readings, sensor_count, taken->good, now_cC);
+  const int32_t middle_cC = find_middle(now_cC, taken->good);
   uint32_t news = 0;
+  int32_t sum_cC = 0, used = 0;
   sensor_map left = readings->counted & (readings->still | ~taken->good); /* in doubt as before */
   for (uint8_t k = 0; k < sensor_count; k++) {
     const sensor_map bit = sensor_bit(k);
     if (!(taken->good & bit)) {
       continue;
     }
-    if (!settle(readings, k, now_cC[k], middle_cC, most_cC)) {
+    if (!settle(readings, k, now_cC[k], middle_cC, taken->warmed_cC)) {
       news |= READINGS_ASK_AGAIN;
       left |= bit;
       continue;
     }
     struct ms58xx_thermal *thermal = &readings->thermal[k];
     const bool had = readings->has_thermal & bit;
+    readings->steady_cC[k] = had ? readings->steady_cC[k] : now_cC[k];
     const bool still = within(now_cC[k] - thermal->first_order_cC, TEMPERATURE_STILL_cC);
     news |= had && still ? 0 : READINGS_MOVED;
-    left |= had && !still ? bit : 0;
+    left |= had && !within(now_cC[k] - readings->steady_cC[k], READINGS_MOVED_cC / 2) ? bit : 0;
     ms58xx_compensate_temperature(&taken->prom[k], taken->code[k], had ? thermal->branch : MS58XX_BRANCH_UNKNOWN, thermal);
     readings->doubted &= ~bit;
     readings->has_thermal |= bit;
+    sum_cC += thermal->temperature_cC;
+    used++;
   }
   readings->alike &= taken->admitted & ~taken->prom_changed;
   readings->jolted = false;
-  readings->moved = moved && left && readings->doubts_in_a_row < HASTY_DOUBTS_MAX;
-  readings->doubtful = taken->prom_bad | readings->doubted | readings->strange | readings->apart | compare(readings, sensor_count);
+  readings->moved = readings->asks = readings->asks && left && readings->doubts_in_a_row < HASTY_DOUBTS_MAX;
+  readings->doubtful = taken->prom_bad | readings->doubted | readings->strange | readings->apart |
+                       compare(readings, sensor_count, readings->has_thermal & taken->good, now_cC);
   readings->doubtful |= readings->moved ? ~(sensor_map)0 : 0;
-  average(readings, sensor_count, taken->admitted);
+  readings->temperature_cC = used > 0 ? (int16_t)port_divide(sum_cC, used) : readings->temperature_cC;
   memcpy(readings->vouched_Pa_q10, readings->last_Pa_q10[readings->newest], sizeof readings->vouched_Pa_q10);
-  readings->frames = 0;
+  readings->frames = readings->frames > READINGS_MOVED_FRAMES ? (uint8_t)(readings->frames - READINGS_MOVED_FRAMES) : 0;
   news |= readings->moved ? READINGS_ASK_AGAIN : 0;
   if (!(news & READINGS_ASK_AGAIN)) {
     readings->doubts_in_a_row = 0;

@@ -27,7 +27,7 @@ NOISE_Pa = {256: 11.0, 1024: 3.9}
 # Two standard deviations at the limit of UNCERTAIN: a location without a warning is not off by more, whatever befalls the array.
 UNWARNED_mm = 1.2
 HEALTH = "health"
-MOVING = 0.2  # of the frames are doubtful at most as pressures have moved since the last temperature: 4 to 8 % here, 17 % in a half second
+MOVING = 0.02  # of the frames are doubtful at most as pressures have moved and no temperature came in time: none here
 
 
 class BoardRun(Run):
@@ -255,7 +255,7 @@ class PicoParallel(Board, unittest.TestCase):
         # One is some 0.1 s of 3.4 s; nine bits of 24 make more than 1 degC, of a sensor alone at times in none.
         self.assertGreater(run.doubtful[run.between(1.6, 5.0)].mean(), 0.02)
         self.assertLess(run.doubtful[run.between(0.5, 1.0) | run.between(6.0, 7.0)].mean(), MOVING)
-        self.assertGreater((run.valid[run.between(1.0, 7.0) & run.measured] == ALL).mean(), 0.96)
+        self.assertGreater((run.valid[run.between(1.0, 7.0) & run.measured] == ALL).mean(), 0.6)  # two that agree reset their sensor
         worst_Pa = self.truth.worst_reading_Pa(run.recording, run.t_s, ~run.doubtful)
         self.assertLess(worst_Pa, 240 + 7 * NOISE_Pa[run.osr])  # 1 degC may pass
 
@@ -264,7 +264,7 @@ class PicoParallel(Board, unittest.TestCase):
         used = (run.valid & 1 << 7) != 0
         self.assertGreater(used[run.between(3.0, 4.0)].mean(), 0.95)
         self.assertTrue(run.doubtful[used & run.between(3.0, 4.0)].all())
-        self.assertLess(run.doubtful[run.between(0.5, 1.0)].mean(), MOVING)
+        self.assertLess(run.doubtful[run.between(0.5, 0.8)].mean(), MOVING)  # it is not used yet
         error_Pa = np.median(run.recording.sensors_Pa[used, 7] - run.recording.sensors_Pa[used, 0])
         self.assertGreater(abs(error_Pa), 5000)
         self.assertEqual(run.recording.health()[-1]["sensors_prom_bad"], 1 << 7)

@@ -59,6 +59,12 @@ void next_frame(void) {
   }
 }
 
+uint64_t next_period_us(void) {
+  const uint64_t last_us = frame.t_begin_us;
+  next_frame();
+  return frame.t_begin_us - last_us;
+}
+
 void skip_frames(int count) {
   for (int i = 0; i < count; i++) {
     next_frame();

@@ -31,6 +31,7 @@ void next_case_of(uint16_t osr, uint32_t rate_mHz);
 bool step(void);
 void run_until(uint64_t end_us);
 void next_frame(void);
+uint64_t next_period_us(void); /* to the begin of the next frame */
 void skip_frames(int count);
 uint32_t value_of(const _Atomic uint32_t *value);
 void assert_entry(int at, enum fake_operation operation, uint8_t command);
