@@ -93,8 +93,6 @@ static std::string serial_in(const std::string &topic) {
 
 static mcap::Reader::Message line_message(const ros::Line &line) { return {"/fingertip/lines", LINE, ros::encode({0, ""}, line), 0}; }
 
-static std::string joint_cells(std::uint32_t device, double time_us) { return std::to_string(device) + "," + fixed(time_us, 1) + ","; }
-
 LogClock::LogClock(const std::string &started_utc, const std::string &started_device_us)
     : begin_ns_(utc_ns(started_utc).value_or(0)), now_ns_(begin_ns_) {
   if (auto device_us = to_u64(started_device_us)) {
@@ -169,8 +167,7 @@ void McapLineSink::device_key(Device &device, const std::string &key, const std:
 /* The head is complete. */
 void McapLineSink::begin() {
   in_head_ = false;
-  const auto head = std::move(head_);
-  head_.clear();
+  const auto head = std::exchange(head_, {});
   std::map<std::string, std::string> keys;
   for (const std::string &text : head) {
     if (auto pair = key_and_value(text)) {
@@ -468,7 +465,7 @@ LineSource::Line McapLineSource::line_of(std::uint64_t number, const mcap::Reade
 }
 
 std::string McapLineSource::text_of(const ros::Row &row) const {
-  return (joint_ ? joint_cells(row.device, *row.time_us) : "") +
+  return (joint_ ? std::to_string(row.device) + "," + fixed(*row.time_us, 1) + "," : "") +
          row_text(row.contact ? &*row.contact : nullptr, row.raw ? &*row.raw : nullptr, sensor_count_, sets_);
 }
 

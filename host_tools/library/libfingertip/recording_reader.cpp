@@ -408,6 +408,10 @@ void RecordingReader::read_line(const std::string &text) {
     if (!columns || (joint_ && devices_.empty())) {
       throw Damage{"unknown header: columns moved, renamed, missing, or added?"};
     }
+    if (const std::string serial = text_field(state_.infos[0].serial);
+        !joint_ && !wanted_.empty() && !serial.empty() && !is_same_serial(serial, wanted_)) {
+      throw Error(ErrorCode::no_such_in_file, path_ + ": no fingertip " + wanted_ + " in it, there are: " + serial);
+    }
     sensor_count_ = columns->sensor_count;
     sets_ = columns->sets;
     state_.header_seen = true;

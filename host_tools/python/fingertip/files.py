@@ -471,6 +471,8 @@ class _Reading:
             if not text.startswith(JOINT_COLUMNS) or self.number is None:
                 raise ValueError(UNKNOWN_HEADER)
             text = text.removeprefix(JOINT_COLUMNS)
+        elif self.serial and self.metadata.get("serial"):
+            _choose_device(self.path, [self.metadata["serial"]], self.serial)
         self.rows = Rows(text)
         self.clock = LogClock(self.metadata)
         self.sensors = self.rows.sensors if self.chosen is None else 0

@@ -356,11 +356,8 @@ class McapLineReader:
         waits: list[tuple[int, int, Line | Contacts]] = []
         last = order = skipped_to = 0
         for each in itertools.chain(self._records(), (None,)):
-            if isinstance(each, Damaged):
-                yield each
-                continue
-            if isinstance(each, Skipped):
-                skipped_to = each.to
+            if isinstance(each, (Damaged, Skipped)):
+                skipped_to = each.to if isinstance(each, Skipped) else skipped_to
                 yield each
                 continue
             singles: list[tuple[int, Line | Contacts]] = []
