@@ -189,28 +189,39 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
 
 using Readings = std::array<GripReading, GRIP_FINGERS>;
 
-// Where no fingertip has a load, and each has a place. What both places have in common is the load: an object that tilts moves them
-// apart.
-static void load_by_place(Readings &readings, const GripSettings &settings, GripPlaceLoad &place) {
-  double t_s = 0.0, force_N = 0.0, x = 0.0, y = 0.0, most = 0.0;
-  for (GripReading &reading : readings) {
-    if (reading.has_load || (reading.counts && !reading.by_place)) {
+// Where no fingertip has a load. What both places have in common is the load: an object that tilts moves them apart. While one of them is
+// not there, or doubted, the other shows it as far apart from it as before.
+static void load_by_place(Readings &readings, const std::array<GripFinger, GRIP_FINGERS> &fingers, const GripSettings &settings,
+                          GripPlaceLoad &place) {
+  double t_s = 0.0, x = 0.0, y = 0.0, most = 0.0;
+  int there = 0;
+  bool all = true;
+  for (std::size_t i = 0; i < readings.size(); i++) {
+    GripReading &reading = readings[i];
+    if (reading.has_load) {
       return;
     }
-    reading.by_place = reading.by_place && reading.has_force;
+    all = all && (reading.by_place || !reading.counts);
+    reading.by_place = reading.by_place && reading.has_force && !fingers[i].is_doubted();
     if (reading.by_place) {
-      reading.pulled_x *= &reading == readings.data() ? 1.0 : -1.0;
+      there++;
+      reading.pulled_x *= i == 0 ? 1.0 : -1.0;
       t_s = std::max(t_s, reading.t_s);
-      force_N += reading.force_N;
-      x += reading.force_N * reading.pulled_x;
-      y += reading.force_N * reading.pulled_y;
+      x += reading.pulled_x;
+      y += reading.pulled_y;
       most = std::max(most, place.alone(reading.pulled_x, reading.pulled_y));
     }
   }
-  if (!(force_N > 0.0)) {
+  if (there == 0 || !(all || place.is_known)) {
     return;
   }
-  place.take(t_s, x / force_N, y / force_N, std::min(settings.friction, PLACE_STICKS));
+  if (there == 2) {
+    place.apart_x = 0.5 * (readings[0].pulled_x - readings[1].pulled_x);
+    place.apart_y = 0.5 * (readings[0].pulled_y - readings[1].pulled_y);
+    place.is_known = true;
+  }
+  const double side = there == 2 ? 0.0 : readings[0].by_place ? 1.0 : -1.0;
+  place.take(t_s, x / there - side * place.apart_x, y / there - side * place.apart_y, std::min(settings.friction, PLACE_STICKS));
   const double pulled = std::max(std::hypot(place.x, place.y), ALONE * most);
   for (GripReading &reading : readings) {
     if (reading.by_place) {
@@ -238,7 +249,8 @@ static void judge(std::array<GripFinger, GRIP_FINGERS> &fingers, Readings &readi
   const bool both = readings[0].has_force && readings[1].has_force;
   const double differ_N = std::abs(readings[0].force_N - readings[1].force_N);
   const double alike_N = settings.alike_N(std::max(readings[0].force_N, readings[1].force_N));
-  const bool together = both && !lasts[0] && !lasts[1] && differ_N <= alike_N; // squeezed, or gone
+  // Both are squeezed, or gone.
+  const bool together = both && !lasts[0] && !lasts[1] && !explained[0] && !explained[1] && differ_N <= alike_N;
   for (std::size_t i = 0; i < fingers.size(); i++) {
     GripReading &reading = readings[i];
     if (!reading.has_force) {
@@ -271,7 +283,7 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   for (std::size_t i = 0; i < fingers.size(); i++) {
     readings[i] = fingers[i].sample(now_s, settings);
   }
-  load_by_place(readings, settings, place);
+  load_by_place(readings, fingers, settings, place);
   if (held != nullptr) {
     judge(fingers, readings, settings, *held);
   } else {

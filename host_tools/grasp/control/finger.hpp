@@ -66,6 +66,7 @@ public:
     doubted_s_ = is_doubted_ ? doubted_s_ : reading.t_s;
     is_doubted_ = true;
   }
+  bool is_doubted() const { return is_doubted_; }
   // Since the first frame that was doubted.
   double doubted_for_s(const GripReading &reading) const { return is_doubted_ ? reading.t_s - doubted_s_ : 0.0; }
 
@@ -133,7 +134,9 @@ struct GripPlaceLoad {
   void take(double t_s, double to_x, double to_y, double sticks);
   double alone(double to_x, double to_y) const { return std::hypot(to_x - slid_x, to_y - slid_y); } // of one place
   double t_s = 0.0, x = 0.0, y = 0.0, slid_x = 0.0, slid_y = 0.0;
-  double speed_mm_s = 0.0; // of a slide
+  double speed_mm_s = 0.0;             // of a slide
+  double apart_x = 0.0, apart_y = 0.0; // the first fingertip's own less this, when both were last there
+  bool is_known = false;               // both were there
 };
 
 // The combined reading of both fingertips; a reading that is not trusted is left out.

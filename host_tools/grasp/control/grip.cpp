@@ -165,6 +165,7 @@ void Grip::approach() {
 
 std::uint32_t Grip::aim(const GripAim &aim) {
   GripAim below = aim;
+  below.exact = !readings_.has_load && !hold_.has_seen_load(); // what never showed a load will not show a slide either
   wanted_N_ = below.wanted_N = std::min(aim.wanted_N, readings_.high_N > settings_.cap_N ? BELOW_CAP * settings_.cap_N : settings_.cap_N);
   return (aim.wanted_N >= settings_.cap_N ? GRIP_AT_CAP : 0u) | reach_.aim(below, readings_, settings_, now_s_);
 }

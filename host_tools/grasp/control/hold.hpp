@@ -49,7 +49,8 @@ public:
   bool is_set() const { return is_set_; } // a set force without a load
   double load_N() const { return load_.now_N(); }
   bool is_loaded() const { return load_.now_N() > LOADED_N; } // enough for a margin to have a meaning
-  bool is_by_place() const { return by_place_; }              // the newest load
+  bool has_seen_load() const { return has_seen_load_; }
+  bool is_by_place() const { return by_place_; } // the newest load
   bool is_sliding() const { return sliding_; }
   bool goes_on() const { return goes_on_; } // slides and does not slow down
   std::uint32_t slides() const { return slides_; }

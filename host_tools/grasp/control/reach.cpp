@@ -168,7 +168,7 @@ bool GripReach::explains(double from_N, double from_s, double to_N, double to_s,
   const double from_mm = width_at(from_s);
   const auto [narrow_mm, wide_mm] = std::minmax({from_mm, width_at(to_s), status_.width_mm, target_mm_});
   const double least_N = rubber_.force_at(wide_mm, from_N, from_mm), most_N = rubber_.force_at(narrow_mm, from_N, from_mm);
-  return knows(from_s) && to_N >= least_N - settings.alike_N(least_N) && to_N <= most_N + settings.alike_N(most_N);
+  return knows(from_s) && to_N >= least_N - 0.5 * settings.alike_N(least_N) && to_N <= most_N + 0.5 * settings.alike_N(most_N);
 }
 
 double GripReach::travel_below_cap_mm(const GripReadings &readings, const GripSettings &settings, double coming_mm) const {
@@ -211,8 +211,7 @@ GripReach::Outlook GripReach::predict(const GripAim &aim, const GripReadings &re
   outlook.least_mm = at_rest ? least_mm() : traits_.step_mm;
   outlook.coming_N = force_at(outlook, outlook.coming_mm);
   outlook.near_N = NEAR * aim.wanted_N;
-  // A contact whose tangential force is unknown will not report a slide either, so no force may miss.
-  outlook.exact = aim.haste == Haste::slides || !readings.has_load;
+  outlook.exact = aim.haste == Haste::slides || aim.exact;
   // Until the effect of an opening is measured, the controller does not reverse it for less than a
   // step. Nor does it add a smaller move to one under way if a slide is already slowing down.
   const bool waits = !outlook.come && (target_mm_ > outlook.width_mm || readings.slides);

@@ -74,6 +74,7 @@ struct GripAim {
   Haste haste;
   bool nearest = false; // true: a set force, as near as moves come. false: at least the wanted force
   bool opens = true;    // false: only closes
+  bool exact = false;   // no force may be missing
 };
 
 class GripReach {

@@ -83,14 +83,15 @@ TEST(Grip, LateFramesAreLateAndNotMissing) {
 }
 
 // No frame is believed alone.
-TEST(Grip, OneFingertipThatReportsNothingOrFarMoreMovesNothing) {
-  for (const double gain : {0.0, 3.0}) {
+TEST(Grip, OneFingertipThatReportsNothingOrLessOrFarMoreMovesNothing) {
+  for (const double gain : {0.0, 0.7, 3.0}) {
     for (const double seconds : {0.003, 0.024, 3.0}) {
       GripWorld world;
       world.carry(2.0, 0.3, 2.0);
       const double before_N = world.force_N;
       world.gain[0] = gain;
       world.run(seconds);
+      expect_share(before_N, world.force_N, 0.05);
       EXPECT_EQ((world.report.trouble & GRIP_FINGER_0_EMPTY) != 0, seconds > 1.0 && gain == 0.0);
       EXPECT_EQ((world.report.trouble & GRIP_FINGERS_DIFFER) != 0, seconds > 1.0);
       world.gain[0] = 1.0;
