@@ -149,7 +149,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
   readings->doubtful = taken->prom_bad | readings->doubted | readings->strange | readings->apart |
                        compare(readings, sensor_count, readings->has_thermal & taken->good, now_cC);
   readings->doubtful |= readings->moved ? ~(sensor_map)0 : 0;
-  readings->temperature_cC = used > 0 ? (int16_t)port_divide(sum_cC, used) : readings->temperature_cC;
+  readings->temperature_cC = (int16_t)(used > 0 ? port_divide(sum_cC, used) : readings->temperature_cC);
   memcpy(readings->vouched_Pa_q10, readings->last_Pa_q10[readings->newest], sizeof readings->vouched_Pa_q10);
   readings->frames = readings->frames > READINGS_MOVED_FRAMES ? (uint8_t)(readings->frames - READINGS_MOVED_FRAMES) : 0;
   news |= readings->moved ? READINGS_ASK_AGAIN : 0;
