@@ -1,6 +1,7 @@
 #include "simulation/player/repeat.h"
 
 #include "app/app.h"
+#include "common/contact_flags.h"
 #include "config/defaults.h"
 
 #include <string.h>
@@ -47,7 +48,8 @@ void repeat_frame(const struct wire_packet *packet, bool held, struct wire_conta
   app.found.frame.temperature_cC = raw->temperature_cC;
   app.found.frame.valid = raw->valid;
   app.found.frame.saturated = raw->saturated;
-  app.found.frame.doubtful = raw->doubtful;
+  app.found.frame.doubtful =
+      held && (raw->flags & CONTACT_FLAG_SENSOR_DOUBTFUL) ? ~(sensor_map)0 : raw->doubtful; /* a held one has no map */
   app.found.frame.unsettled = raw->doubtful == raw->valid ? raw->valid : 0; /* what has moved is doubted whole (scan/readings.h) */
   memcpy(app.found.frame.pressure_Pa_q10, raw->pressure_Pa_q10, sizeof app.found.frame.pressure_Pa_q10);
   app_process_frame(&app, 0);
