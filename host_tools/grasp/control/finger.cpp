@@ -193,7 +193,7 @@ using Readings = std::array<GripReading, GRIP_FINGERS>;
 // not there, or doubted, the other shows it as far apart from it as before.
 static void load_by_place(Readings &readings, const std::array<GripFinger, GRIP_FINGERS> &fingers, const GripSettings &settings,
                           GripPlaceLoad &place) {
-  double t_s = 0.0, x = 0.0, y = 0.0, most = 0.0;
+  double t_s = 0.0, x = 0.0, y = 0.0;
   int there = 0;
   bool all = true;
   for (std::size_t i = 0; i < readings.size(); i++) {
@@ -209,7 +209,7 @@ static void load_by_place(Readings &readings, const std::array<GripFinger, GRIP_
       t_s = std::max(t_s, reading.t_s);
       x += reading.pulled_x;
       y += reading.pulled_y;
-      most = std::max(most, place.alone(reading.pulled_x, reading.pulled_y));
+      place.take_alone(reading.pulled_x, reading.pulled_y, reading.force_N);
     }
   }
   if (there == 0 || !(all || place.is_known)) {
@@ -222,7 +222,6 @@ static void load_by_place(Readings &readings, const std::array<GripFinger, GRIP_
   }
   const double side = there == 2 ? 0.0 : readings[0].by_place ? 1.0 : -1.0;
   place.take(t_s, x / there - side * place.apart_x, y / there - side * place.apart_y, std::min(settings.friction, PLACE_STICKS));
-  const double pulled = std::max(std::hypot(place.x, place.y), ALONE * most);
   for (GripReading &reading : readings) {
     if (reading.by_place) {
       reading.has_load = true;
@@ -230,7 +229,7 @@ static void load_by_place(Readings &readings, const std::array<GripFinger, GRIP_
       reading.load_y_N = place.y * reading.force_N;
       reading.moved_x_N = reading.load_x_N + place.slid_x * reading.force_N;
       reading.moved_y_N = reading.load_y_N + place.slid_y * reading.force_N;
-      reading.load_N = pulled * reading.force_N;
+      reading.load_N = std::max(std::hypot(reading.load_x_N, reading.load_y_N), ALONE * place.alone_N);
       reading.load_sd_N = std::max(PLACE_SD * reading.load_N, LOAD_SD_LEAST_N);
       reading.speed_mm_s = place.speed_mm_s;
       reading.slides = reading.speed_mm_s > SLIDES_mm_s;

@@ -4,6 +4,7 @@
 #include "grasp/control/settings.hpp"
 #include "grasp/fingertip_grip.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -132,7 +133,12 @@ private:
 // Tangential over normal force by how far the contacts have moved. What has moved further than friction holds has slid.
 struct GripPlaceLoad {
   void take(double t_s, double to_x, double to_y, double sticks);
-  double alone(double to_x, double to_y) const { return std::hypot(to_x - slid_x, to_y - slid_y); } // of one place
+  // Of one place. A load moves it less as the force grows, so only what it moves further adds to alone_N.
+  void take_alone(double to_x, double to_y, double force_N) {
+    const double moved = std::max(std::hypot(to_x - slid_x, to_y - slid_y) - alone, 0.0);
+    alone += moved, alone_N += moved * force_N;
+  }
+  double alone = 0.0, alone_N = 0.0; // the furthest of one place, and the load that it would be
   double t_s = 0.0, x = 0.0, y = 0.0, slid_x = 0.0, slid_y = 0.0;
   double speed_mm_s = 0.0;             // of a slide
   double apart_x = 0.0, apart_y = 0.0; // the first fingertip's own less this, when both were last there
