@@ -3,6 +3,8 @@
 #include "line.hpp"
 #include "packet_file.hpp"
 
+#include <filesystem>
+
 using namespace fingertip;
 
 // Without what a recording has elsewhere, or not at all: commands, raw packets of another number of

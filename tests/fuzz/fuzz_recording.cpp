@@ -6,6 +6,7 @@
 #include "packet_file.hpp"
 
 #include <cmath>
+#include <filesystem>
 
 using namespace fingertip;
 

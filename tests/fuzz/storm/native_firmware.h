@@ -1,14 +1,14 @@
 /* The firmware on boards/native, for C++, which its headers are not written for. */
 #pragma once
 
-#include "native/native_port.h"
-#include "native/sim_array.h"
-
 #include <stdint.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+#include "native/native_port.h"
+#include "native/sim_array.h"
 
 struct sim_array *storm_firmware_array(void);
 
