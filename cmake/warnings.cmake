@@ -17,7 +17,7 @@ if(FINGERTIP_SANITIZE)
 endif()
 if(FINGERTIP_LIBFUZZER)
   add_compile_options(-fsanitize=fuzzer-no-link)
-  add_compile_definitions(_GLIBCXX_ASSERTIONS _GLIBCXX_SANITIZE_VECTOR) # libstdc++ checks its bounds
+  add_compile_definitions(_GLIBCXX_ASSERTIONS) # libstdc++ checks its bounds
 endif()
 # By clang, whose warnings are others: gcc has judged the same sources.
 if(FINGERTIP_LIBFUZZER OR CMAKE_SYSTEM_PROCESSOR STREQUAL "wasm32")

@@ -35,7 +35,11 @@ constexpr Target ON_THE_LINE[] = {
     {"store_writes", 100000, 1500000},
 };
 
-static wire_packet set(const std::string &text) { return fingertip::setting_commands({fingertip::setting_from_text(text)}, {})[0]; }
+static wire_packet set(const std::string &text) {
+  wire_info now{};
+  now.slip_window_ms = 50; // travels with the threshold
+  return fingertip::setting_commands({fingertip::setting_from_text(text)}, now)[0];
+}
 
 Storm::Storm(NativePlant &plant, World &world, Judge &judge, std::uint64_t seed, fuzz_input input)
     : plant_(plant), world_(world), judge_(judge), input_(input), random_{seed * 2 + 0x5EED} {
