@@ -28,7 +28,7 @@
  * like them twice in a row: its PROM may be wrong in spite of its CRC.
  *
  * A sensor whose PROM has a wrong CRC is used, since one genuine part is known to have one. It is doubtful. It must
- * first have read like the others at two temperatures in a row. */
+ * first have read like the others at two temperatures in a row, where there are three to compare with. */
 #pragma once
 
 #include "common/limits.h"
@@ -38,7 +38,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define READINGS_TEMPERATURE_STEP_MAX_cC 100
+/* Two temperatures of a sensor that has lost its state, or those before and after its reset: it warms by less meanwhile. */
+#define READINGS_TEMPERATURE_SAME_cC 100
 /* Sensors of one pad at rest: two parts of +-2 degC, and a warm object at one end. Further off,
  * a temperature must agree with a second one, no more. */
 #define READINGS_TEMPERATURE_NEAR_cC 500
@@ -54,10 +55,11 @@
 #define READINGS_JOLT_Pa_q10 (MS58XX_STEP_Pa * 768)
 /* Less is no change of the force by a tenth, or of the place by 0.6 mm, in a press of 5 N. */
 #define READINGS_MOVED_Pa (MS58XX_STEP_Pa / 2)
-/* A hand warms a pad whose temperature stood still by 0.2 degC within the longest interval of temperatures. */
+/* Codes that are 0.1 % off make that, and 240 Pa. It is twenty times the noise of a temperature at OSR 256. */
 #define READINGS_MOVED_cC 25
-/* From one temperature to the next that a move asks for, on the average: each takes the place of a frame. After a rest some follow each
- * other. It is asked for early enough to come in time. */
+/* From one temperature to the next that a move asks for, on the average: each takes the place of a frame. After a rest four may follow
+ * each other, since a press that begins moves by READINGS_MOVED_Pa every few frames. It is asked for three frames early: one runs by
+ * then, the next is its own, and the main context may be late by one. */
 #define READINGS_MOVED_FRAMES 32
 #define READINGS_FRAMES_MAX (4 * READINGS_MOVED_FRAMES)
 #define READINGS_ASK_FRAMES (READINGS_MOVED_FRAMES - 3)

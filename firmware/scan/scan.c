@@ -211,7 +211,7 @@ static sensor_map take_codes(struct scan *scan, const struct scan_conversion *co
 static __attribute__((noinline)) void take_reading(struct scan *scan, const struct scan_conversion *conversion) {
   struct scan_slot *slot = slot_for(scan, conversion);
   sensor_map good = take_codes(scan, conversion, slot ? slot->code : NULL);
-  scan->zero_seen |= scan->was_zero;
+  scan->zero_seen |= conversion->is_temperature ? 0 : scan->was_zero; /* what has no temperature is asked for one anyway */
   if (conversion->is_frame) {
     count(&scan->counters.frames, 1);
     if (good != first_sensors(scan->sensor_count)) {
@@ -496,7 +496,8 @@ static void use_temperature(struct scan *scan, const struct scan_slot *slot) {
       .returned = slot->returned,
       .prom_bad = scan_read_map(&scan->prom_bad),
       .admitted = scan_read_map(&scan->admitted),
-      .warmed_cC = (int32_t)(apart_us >> 15), /* three times what a hand warms */
+      /* Six times what a hand warms, without a remainder that is lost each time. */
+      .warmed_cC = (int32_t)((uint32_t)(slot->conversion.t_us >> 14) - (uint32_t)(scan->temperature_us >> 14)),
       .is_soon = TEMPERATURE_INTERVAL_us > apart_us,
       .is_patient = scan->bring_up.interval_us > 1000000u,
   };

@@ -148,7 +148,7 @@ struct scan {
   uint32_t frame_number;
   sensor_map void_next;         /* bitmap: the next reading does not count */
   sensor_map was_zero;          /* bitmap: the last reading was 0 */
-  sensor_map zero_seen;         /* bitmap: one was since the slot of the frame was filled */
+  sensor_map zero_seen;         /* bitmap: a pressure was since the slot of the frame was filled */
   sensor_map still[SCAN_STILL]; /* [n] bitmap: the same code as in the n + 1 frames before */
   sensor_map missed_once;       /* bitmap: the last reading was not acknowledged, ... */
   sensor_map missed_twice;      /* ... nor the one before */

@@ -34,12 +34,12 @@ static bool settle(struct readings *readings, uint8_t k, int32_t now_cC, int32_t
   sensor_map bit = sensor_bit(k);
   bool possible = now_cC >= TEMPERATURE_MIN_cC && now_cC <= TEMPERATURE_MAX_cC;
   bool near = possible && (middle_cC == NO_MIDDLE || within(now_cC - middle_cC, READINGS_TEMPERATURE_NEAR_cC));
-  bool agrees = (readings->doubted & bit) && within(now_cC - readings->doubted_cC[k], READINGS_TEMPERATURE_STEP_MAX_cC);
+  bool agrees = (readings->doubted & bit) && within(now_cC - readings->doubted_cC[k], READINGS_TEMPERATURE_SAME_cC);
   bool use;
   bool insists; /* reports it again, and it cannot be */
   if (!(readings->has_thermal & bit)) {
     const bool pardoned = readings->pardoned & bit, known = readings->known & bit;
-    const bool kept = known ? within(now_cC - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_STEP_MAX_cC) : near;
+    const bool kept = known ? within(now_cC - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_SAME_cC) : near;
     use = possible && (kept || (agrees && pardoned));
     insists = !use && (agrees || (known && !pardoned));
   } else {
@@ -113,11 +113,12 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     prove(readings, sensor_count);
   }
 
-  int32_t now_cC[FT_MAX_SENSORS] = {0};
+  int32_t now_cC[FT_MAX_SENSORS] = {0}; /* at first those in use, where there are */
   for (uint8_t k = 0; k < sensor_count; k++) {
-    now_cC[k] = ms58xx_first_order_cC(&taken->prom[k], taken->code[k]);
+    const bool has = readings->has_thermal & sensor_bit(k);
+    now_cC[k] = has ? readings->thermal[k].first_order_cC : ms58xx_first_order_cC(&taken->prom[k], taken->code[k]);
   }
-  const int32_t middle_cC = find_middle(now_cC, taken->good);
+  const int32_t middle_cC = find_middle(now_cC, readings->has_thermal | taken->good);
   uint32_t news = 0;
   int32_t sum_cC = 0, used = 0;
   sensor_map left = readings->counted & (readings->still | ~taken->good); /* in doubt as before */
@@ -126,6 +127,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
     if (!(taken->good & bit)) {
       continue;
     }
+    now_cC[k] = ms58xx_first_order_cC(&taken->prom[k], taken->code[k]);
     if (!settle(readings, k, now_cC[k], middle_cC, taken->warmed_cC)) {
       news |= READINGS_ASK_AGAIN;
       left |= bit;
@@ -147,7 +149,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
   readings->jolted = false;
   readings->moved = readings->asks = readings->asks && left && readings->doubts_in_a_row < HASTY_DOUBTS_MAX;
   readings->doubtful = taken->prom_bad | readings->doubted | readings->strange | readings->apart |
-                       compare(readings, sensor_count, readings->has_thermal & taken->good, now_cC);
+                       compare(readings, sensor_count, readings->has_thermal & taken->good & ~readings->doubted, now_cC);
   readings->doubtful |= readings->moved ? ~(sensor_map)0 : 0;
   readings->temperature_cC = (int16_t)(used > 0 ? port_divide(sum_cC, used) : readings->temperature_cC);
   memcpy(readings->vouched_Pa_q10, readings->last_Pa_q10[readings->newest], sizeof readings->vouched_Pa_q10);

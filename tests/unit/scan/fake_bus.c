@@ -26,7 +26,7 @@ static enum ft_status start(struct fake_bus *fake, enum fake_operation operation
   if (misused_if(fake, fake->logged == FAKE_LOG, "the log is full")) {
     return FT_ERR_SPACE;
   }
-  static const uint32_t duration_us[] = {FAKE_COMMAND_us, FAKE_READ_us, FAKE_RECOVERY_us};
+  const uint32_t duration_us[] = {FAKE_COMMAND_us, fake->read_us, FAKE_RECOVERY_us};
   const bool sends = operation != FAKE_RECOVERY;
   misused_if(fake, sends && now_us < fake->ready_us, "something was sent during a conversion");
   misused_if(fake, sends && now_us < fake->powered_us, "something was sent before the PROM was loaded");
@@ -136,6 +136,7 @@ static enum ft_status poll(void *context, uint64_t now_us, struct array_bus_resu
 void fake_bus_init(struct fake_bus *fake, struct array_bus *bus, uint8_t sensor_count) {
   memset(fake, 0, sizeof *fake);
   fake->sensor_count = sensor_count;
+  fake->read_us = FAKE_READ_us;
   fake->answering = first_sensors(sensor_count);
   fake->fail_at = -1;
   fake->fail_with = FT_ERR_TIMEOUT;

@@ -26,6 +26,7 @@ struct fake_bus {
   uint32_t d1[FT_MAX_SENSORS], d2[FT_MAX_SENSORS];
   uint32_t misread_prom;      /* bitmap: one bit of word 3 is flipped ... */
   int misread_passes;         /* ... in this many passes to come */
+  uint32_t read_us;           /* of a read */
   uint32_t zero_next;         /* bitmap: the next ADC reading is 0 */
   uint32_t frozen;            /* bitmap: all pressures have the same code */
   int fail_at;                /* operations until one fails; -1: none */

@@ -217,6 +217,28 @@ TEST(test_what_moves_between_two_temperatures_is_doubtful_until_the_next) {
   }
 }
 
+TEST(test_one_temperature_after_a_jolt_makes_a_suspect) {
+  for (int jolts = 0; jolts < 2; jolts++) {
+    next_case();
+    step_by(ONE, 6.4e3 * jolts);
+    step_by(ONE + 1, 6.4e3 * jolts);
+    take_pressures(ALL);
+    warm_by(ONE, 2);
+    take_temperature();
+    TEST_ASSERT_EQUAL_HEX32(jolts ? ONE_BIT : 0, readings.suspects);
+  }
+}
+
+/* The others are held against what is in use, not against what came. */
+TEST(test_most_temperatures_that_are_off_leave_the_others_trusted) {
+  start();
+  for (int k = 0; k < 8; k++) {
+    warm_by(k, -16);
+  }
+  expect_after_temperature(ALL);
+  TEST_ASSERT_EQUAL_HEX32(0xFF, frame.doubtful);
+}
+
 TEST(test_after_a_rest_temperatures_follow_each_other) {
   start();
   for (int frames = 0; frames < READINGS_FRAMES_MAX; frames++) {
@@ -317,6 +339,10 @@ TEST(test_a_temperature_step_needs_a_second_and_makes_a_suspect) {
     TEST_ASSERT_EQUAL_HEX32(cases[i].suspect ? 0 : ONE_BIT, frame.doubtful);
     TEST_ASSERT_DOUBLE_WITHIN(0.01, cases[i].suspect ? 0.0 : rest_Pa, frame.pressure_Pa_q10[ONE] / 1024.0);
     d2[ONE] = rest;
+    temperature.returned = readings.suspects;
+    take_temperature();
+    take_pressures(ALL);
+    TEST_ASSERT_EQUAL_HEX32(cases[i].suspect ? ONE_BIT : 0, frame.restored); /* the others' zeros are as old as they were */
   }
 }
 

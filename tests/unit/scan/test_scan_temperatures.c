@@ -33,6 +33,42 @@ TEST(test_all_sensors_may_be_warmer_after_long) {
   TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND));
 }
 
+/* With a data line for each sensor, a temperature that a move asks for comes 24 ms after the last one, and before any frame is in doubt. */
+TEST(test_a_pad_that_warms_while_pressures_move_is_neither_reset_nor_doubted) {
+  next_case_of(256, 0);
+  fake.read_us = 100;
+  const uint32_t d2 = fake.d2[0];
+  int doubtful = 0, held = 0;
+  while (now_us < 10000000) {
+    next_frame();
+    doubtful += frame.doubtful != 0;
+    held += frame.held;
+    for (uint8_t k = 0; k < SENSORS; k++) {
+      fake.d1[k] += frame.number / 128 % 2 ? 1000u : -1000u;
+      fake.d2[k] = d2 + (uint32_t)(now_us * 3 / 1000); /* 0.1 degC/s */
+    }
+  }
+  TEST_ASSERT_EQUAL_INT(0, doubtful);
+  TEST_ASSERT_GREATER_THAN_INT(300, held);
+  TEST_ASSERT_EQUAL_INT(1, count_entries(0x1E, FAKE_COMMAND));
+}
+
+/* Where a branch acknowledges as one, it is no reason for a reset. Where each sensor does, resets that do not help get rare. */
+TEST(test_a_temperature_that_is_always_zero_costs_few_frames) {
+  for (int single = 0; single < 2; single++) {
+    next_case(&usual);
+    bus.answers_are_single = single != 0;
+    run_until(1000000);
+    fake.d2[DISTURBED] = 0;
+    int all = 0, good = 0;
+    for (; now_us < 20000000; all++) {
+      next_frame();
+      good += (frame.valid & ~frame.doubtful & ~DISTURBED_BIT) == (ALL & ~DISTURBED_BIT);
+    }
+    TEST_ASSERT_GREATER_THAN_INT(all * 98 / 100, good);
+  }
+}
+
 /* Two temperatures that agree with each other and with no other sensor: it has lost its state. Its reset makes it the sensor it was. */
 TEST(test_sensor_that_tells_another_temperature_is_reset) {
   run_until(3000000);
