@@ -16,7 +16,6 @@ const OF_SENSOR = {
   sensor_prom_bit: 'promBit', // bit 10 of C1 reads back inverted: some 7 kPa
   sensor_adc_zero: 'adcZero', // every ADC read gives 0
   sensor_d2_corrupt: 'd2Corrupt', // every temperature has one bit inverted, another one each time
-  sensor_noisy: 'noisy', // ten times the noise of the datasheet
   sensor_fast: 'fast', // acknowledges so soon that an I2C controller without a receive hold takes it for lost arbitration
 };
 
@@ -30,7 +29,6 @@ const ONCE_OF_SENSOR = {
 const OF_BOARD = {
   sda_stuck_low: 'sensor', // pulls SDA from from_s until nine clocks reached it or its multiplexer was reset
   mux_stuck: 'mux', // acknowledges nothing until its RESET line was pulsed
-  mux_dead: 'mux', // acknowledges nothing and connects nothing
   line_stuck_low: 'sensor', // its SDA is tied to ground; behind a multiplexer only while its channel is on
 };
 

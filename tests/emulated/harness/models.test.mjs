@@ -152,8 +152,8 @@ test('sensor: conversion time stays below the maximum, differs between parts, sa
 });
 
 test('sensor: noise has the rms of its oversampling and repeats with its seed', () => {
-  const sample = (seed, faults) => {
-    const b = sensorBench({ prng: new Prng(seed), stimulus: at(1e5), faults });
+  const sample = (seed) => {
+    const b = sensorBench({ prng: new Prng(seed), stimulus: at(1e5) });
     const { prom } = b.sensor;
     b.command(0x1e, 3);
     return Array.from({ length: 2000 }, () => {
@@ -162,15 +162,10 @@ test('sensor: noise has the rms of its oversampling and repeats with its seed', 
     });
   };
   const values = sample(5);
-  const statistics = (list) => {
-    const mean = list.reduce((a, v) => a + v, 0) / list.length;
-    return { mean, rms: Math.sqrt(list.reduce((a, v) => a + (v - mean) ** 2, 0) / list.length) };
-  };
-  const { mean, rms } = statistics(values);
+  const mean = values.reduce((a, v) => a + v, 0) / values.length;
+  const rms = Math.sqrt(values.reduce((a, v) => a + (v - mean) ** 2, 0) / values.length);
   assert.ok(Math.abs(mean - 1e5) < 0.4, `${mean}`);
   assert.ok(Math.abs(rms / 3.9 - 1) < 0.06, `${rms}`);
-  const noisy = statistics(sample(5, () => ({ noisy: true })));
-  assert.ok(Math.abs(noisy.rms / 39 - 1) < 0.06, `${noisy.rms} with the fault`);
   assert.deepEqual(sample(5).slice(0, 20), values.slice(0, 20));
   assert.notDeepEqual(sample(6).slice(0, 20), values.slice(0, 20));
 });
@@ -211,22 +206,6 @@ test('multiplexer: broadcast acknowledges if any sensor does; RESET disconnects'
   assert.ok(!b.write(0x76, 0x48));
   b.mux.setReset(true);
   assert.ok(!b.write(0x70, 1), 'held in reset');
-});
-
-test('multiplexer: a dead one answers nothing, whatever its RESET does, and frees what it connected', () => {
-  const b = muxBench();
-  b.write(0x70, 1);
-  b.sensor.tied = true;
-  assert.ok(b.mux.holdsSda);
-  b.mux.dead = true;
-  assert.ok(!b.mux.holdsSda);
-  b.mux.setReset(true);
-  b.mux.setReset(false);
-  assert.ok(!b.write(0x70, 1));
-  assert.ok(!b.write(0x76, 0x1e));
-  b.mux.dead = false;
-  assert.ok(b.write(0x70, 2));
-  assert.ok(b.write(0x76, 0x1e));
 });
 
 test('bus: two sensors answering one read are ANDed and reported', () => {

@@ -18,8 +18,6 @@ const RESET_NS = 2.8e6;
 const CONVERSION_FRACTION = 0.96;
 const OSCILLATOR_TOLERANCE = 0.04;
 const CODE_MAX = 0xffffff;
-/** Noise of a noisy sensor, times the datasheet's. */
-const NOISY = 10;
 
 /** MS5840, by osr field / 2: maximum conversion time, pressure noise rms, temperature noise rms. */
 export const OSR = [
@@ -160,7 +158,7 @@ export class Ms5840 extends I2cTarget {
   /**
    * @param options index; prng: this sensor's own; now_ns: () => time; report: Report;
    *   stimulus: (index, t_ns) => { pressure_Pa, temperature_degC }, absolute;
-   *   sensor: see findSensor; faults: (index) => { dead, promCorrupt, promCollision, promBit, adcZero, d2Corrupt, noisy, fast } of this moment, { nacks, brownOuts } so far
+   *   sensor: see findSensor; faults: (index) => { dead, promCorrupt, promCollision, promBit, adcZero, d2Corrupt, fast } of this moment, { nacks, brownOuts } so far
    */
   constructor({ index, prng, now_ns, report, stimulus, sensor = 'ms5840', faults = () => ({}) }) {
     super(ADDRESS);
@@ -310,7 +308,7 @@ export class Ms5840 extends I2cTarget {
 
   #code({ isPressure, osr, start_ns, end_ns, spoiled, wrong }) {
     const { pressure_Pa, temperature_degC } = this.stimulus(this.index, (start_ns + end_ns) / 2);
-    const noise = this.prng.normal() * (this.faults(this.index).noisy ? NOISY : 1);
+    const noise = this.prng.normal();
     const codes = isPressure
       ? codesFor(this.prom, pressure_Pa + noise * osr.noise_Pa, temperature_degC, this.kind).d1
       : codesFor(this.prom, pressure_Pa, temperature_degC + noise * osr.noise_degC, this.kind).d2;

@@ -74,10 +74,6 @@ export class MultiplexedBoard {
       mux_stuck: (mux, active) => {
         this.muxes[mux].stuck = active;
       },
-      mux_dead: (mux, active) => {
-        this.muxes[mux].dead = active;
-        this.bus.linesChanged();
-      },
     };
   }
 

@@ -19,8 +19,6 @@ export class Tca9548a extends I2cTarget {
     this.inReset = false;
     /** Fault: answers nothing and stays as it is until its RESET is pulsed. */
     this.stuck = false;
-    /** Fault: answers nothing and connects nothing. */
-    this.dead = false;
     /** What each control byte connects, as far as it was asked for. */
     this.connectedBy = new Map();
     this.onReset = () => {};
@@ -32,7 +30,7 @@ export class Tca9548a extends I2cTarget {
   }
 
   get connected() {
-    if (this.inReset || this.dead) return NONE;
+    if (this.inReset) return NONE;
     let connected = this.connectedBy.get(this.control);
     if (!connected) {
       connected = this.channels.flatMap((targets, channel) => ((this.control >> channel) & 1 ? targets : []));
@@ -57,7 +55,7 @@ export class Tca9548a extends I2cTarget {
   }
 
   acknowledgesAddress() {
-    return !this.inReset && !this.stuck && !this.dead;
+    return !this.inReset && !this.stuck;
   }
 
   receive(byte) {
