@@ -6,7 +6,6 @@ import pcb_check
 import route
 from sheet import number
 
-THICK_mm = 1.6
 MIDDLE_mm = 100  # of the pad, on KiCad's sheet
 HOLE_FREE_mm = 0.1  # around a hole, beside the clearance of tracks
 FONT = "(effects (font (size 0.7 0.7) (thickness 0.12))"
@@ -69,7 +68,7 @@ def board_text(board):
     numbers = {net: n + 1 for n, net in enumerate(sorted({net for part in parts for net in part.nets.values()}))}
     lines = [
         "(kicad_pcb (version 20211014) (generator fingertip)",
-        f'  (general (thickness {THICK_mm})) (paper "A4") (layers {LAYERS})',
+        f'  (general (thickness {mould.BOARD_mm})) (paper "A4") (layers {LAYERS})',
         f'  (setup (pad_to_mask_clearance 0.05) (aux_axis_origin {at(0, 0)})) (net 0 "")',
         *(f'  (net {n} "{net}")' for net, n in numbers.items()),
         f'  (gr_rect (start {at(-x, -y)}) (end {at(x, y)}) (layer "Edge.Cuts") (width 0.1) (fill none))',

@@ -20,6 +20,7 @@ class Pad:
     high_mm: float  # of a sensor
     thickness_mm: float
     overhang_mm: float
+    strip_mm: tuple = None  # width and length, if it is one strip on a circuit board of its own
 
 
 def descriptor(folder):
@@ -37,3 +38,13 @@ def pad(path):
     if not places:
         places = [[pitch_mm * (k // rows - (columns - 1) / 2), pitch_mm * (k % rows - (rows - 1) / 2)] for k in range(columns * rows)]
     return Pad(found["name"], places, pitch_mm, *SENSORS[found["sensor"]], **RUBBER | found.get("rubber", {}))
+
+
+def pads_of(descriptor, root=ROOT):
+    """A circuit board's pad; and where such boards lie on the base plate: one for all sensors, or one for each strip, if the board has `strip_mm`."""
+    whole, count = pad(root / f"boards/pads/{descriptor['pad']}.json"), descriptor["wiring"]["sensor_count"]
+    if "strip_mm" not in descriptor:
+        return whole, [(0, 0)]
+    middles = [[sum(axis) / count for axis in zip(*whole.places[k : k + count])] for k in range(0, len(whole.places), count)]
+    places = [[x - middles[0][0], y - middles[0][1]] for x, y in whole.places[:count]]
+    return dataclasses.replace(whole, places=places, strip_mm=tuple(descriptor["strip_mm"])), middles

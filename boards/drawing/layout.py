@@ -13,7 +13,7 @@ import wiring
 
 BESIDE_mm, APART_mm = 3.4, 1.6  # capacitor and resistors of a sensor from its middle: to its sides, and from each other
 ROOMY_mm = 8.3  # pitch from which there is room on both sides
-EDGE_mm, PULLS_mm, CONNECTOR_mm = 26, 5, 3.5  # the middles of Pico, resistors of the bus and connector from the board's edge
+EDGE_mm, PULLS_mm, CONNECTOR_mm, WIRES_mm = 26, 5, 3.5, 6  # the middles of Pico, resistors of the bus, connector, wires from the edge
 MULTIPLEXER_mm = 8.5  # its middle from the outer sensors
 HEAD_mm = 3.2  # of an M3's nut across its corners, half
 CHANNELS = [(4, 5), (6, 7), (8, 9), (10, 11), (13, 14), (15, 16), (17, 18), (19, 20)]  # SD and SC of a TCA9548A
@@ -35,8 +35,9 @@ SENSOR = Land("Sensor_Pressure:TE_MS5837-xxBA", rows(4, 1, 2, 1.3, 1.3), 1.95, 1
 RESISTOR = Land("Resistor_SMD:R_0603_1608Metric", rows(2, 0.825, 0, 0.8, 0.95), 1.48, 0.73)
 CAPACITOR = Land("Capacitor_SMD:C_0603_1608Metric", rows(2, 0.775, 0, 0.9, 0.95), 1.48, 0.73)
 MULTIPLEXER = Land("Package_SO:TSSOP-24_4.4x7.8mm_P0.65mm", rows(24, 2.8625, 0.65, 1.475, 0.4), 3.85, 4.15)
-WIRES = [(n + 1, n - 3.5, -2, 0.6, 1.55) for n in range(8)] + [("MP", x, 1.875, 1.2, 1.8) for x in (-4.8, 4.8)]
-CONNECTOR = Land("Connector_JST:JST_SH_SM08B-SRSS-TB_1x08-1MP_P1.00mm_Horizontal", WIRES, 5.9, 3.28)
+CONTACTS = [(n + 1, n - 3.5, -2, 0.6, 1.55) for n in range(8)] + [("MP", x, 1.875, 1.2, 1.8) for x in (-4.8, 4.8)]
+CONNECTOR = Land("Connector_JST:JST_SH_SM08B-SRSS-TB_1x08-1MP_P1.00mm_Horizontal", CONTACTS, 5.9, 3.28)
+WIRES = Land("fingertip:wires", rows(8, 2.6, 2.54, 1.8, 1.5), 3.7, 4.7)
 # Holes for solder of the USB socket's legs; and no copper beside test points and SWD pads, of Pico and Pico W.
 LEGS = [(side * x, y, diameter) for x, y, diameter in ((2.725, -24, 2.2), (2.425, -20.97, 1.85)) for side in (-1, 1)]
 POINTS = [("B", 3.9, -25.3, -10), ("B", 2, -6, -4), ("B", 6.7, 4.7, 6.7), ("B", 3.6, 22.9, 26.6)]
@@ -65,10 +66,13 @@ class Parts(list):
 
 
 def parallel(board, edge):
-    """The Pico is on the back: no cable."""
+    """The Pico is on the back: no cable. From a strip wires lead to it."""
     parts, ohm, side = Parts(), board.pull_ups_ohm, 1 if board.pad.pitch_mm > ROOMY_mm else -1
     parts.sensors(board.pad, "SCL", {"SDA{}": (side, ohm["sda"])})
-    parts.resistor(8, edge + PULLS_mm, 0, ohm["scl"], "SCL")
+    parts.resistor(0, -edge - PULLS_mm, 0, ohm["scl"], "SCL")  # at SCL's far end, to be probed there
+    if board.pad.strip_mm:
+        parts.part("X", WIRES, 0, edge + WIRES_mm, 0, True, dict(enumerate(wiring.cable(board), 1)), "")
+        return parts
     nets = dict.fromkeys([*pico.grounds(), pico.pin("AGND")], "GND") | {pico.pin("3V3"): "3V3"}
     lines = [*(f"SDA{k}" for k in range(board.sensors)), "SCL", "SYNC"]
     nets |= {pico.pin(f"GP{gpio}"): net for gpio, net in zip(wiring.gpios(board), lines)}
@@ -84,8 +88,10 @@ def multiplexed(board, edge):
         raise wiring.Unwired(f"boards/{board.name}: {board.strips} strips; a circuit board has a place and a wire for three")
     parts.sensors(board.pad, "SCL{}", {"SDA{}": (-1, ohm["channel"]), "SCL{}": (1, ohm["channel"])})
     right, down = (max(abs(place[axis]) for place in board.pad.places) + MULTIPLEXER_mm for axis in (0, 1))
-    beside = [(-right, 0, 180, -1.3, -6), (0, down, 270, -6, 1.3), (right, 0, 0, 1.3, 6)]  # the last two: to its capacitor
-    for strip, (x, y, turn, dx, dy) in zip(range(board.strips), beside if board.strips > 2 else beside[::2]):
+    beside = {-1: (-right, 0, 180, -1.3, -6), 0: (0, down, 270, -6, 1.3), 1: (right, 0, 0, 1.3, 6)}  # the last two: to its capacitor
+    for strip in range(board.strips):
+        left, others = strip, board.strips - 1 - strip  # strips on both sides of this one
+        x, y, turn, dx, dy = beside[(left > others) - (left < others)]
         nets = {12: "GND", 24: "3V3", 22: "SCL", 23: "SDA", 3: f"RESET{strip}"} | dict(zip((21, 2, 1), wiring.levels(board, strip)))
         for k, (data, clock) in zip(board.sensors_of(strip), CHANNELS):
             nets |= {data: f"SDA{k}", clock: f"SCL{k}"}
@@ -94,7 +100,7 @@ def multiplexed(board, edge):
     pulls = [("SDA", ohm["bus"]), ("SCL", ohm["bus"])] + [(f"RESET{strip}", ohm["reset"]) for strip in range(board.strips)]
     for i, (net, value) in enumerate(pulls):
         parts.resistor(4 * (i - (len(pulls) - 1) / 2), edge + PULLS_mm, 90, value, net)
-    nets = {pin + 1: net for pin, net in enumerate(wiring.cable(board))} | {"MP": "GND"}
+    nets = {pin + 1: net for pin, net in enumerate(wiring.cable(board)) if net} | {"MP": "GND"}
     parts.part("X", CONNECTOR, 0, edge + CONNECTOR_mm, 0, True, nets, "JST SH 8")
     return parts
 

@@ -16,6 +16,7 @@ HOLE_PLAY_mm = 0.2  # around a sensor
 FRAME_PLAY_mm = 0.3  # around the skin, each side
 RIM_mm = 6.0  # of frame and base plate around the flange, for the screws
 SCREW_mm = 3.2  # hole of an M3
+BOARD_mm = 1.6  # thickness of a circuit board
 LID_mm = 3.0  # of the frame above the flange
 WALL_mm = 5.0  # of the mould
 DRAWN_APART_mm = 12.0
@@ -43,9 +44,9 @@ def measures(pad):
     return Measures(
         skin,
         flange,
-        outside,
+        pad.strip_mm or outside,
         tuple(mm + 2 * FRAME_PLAY_mm for mm in skin),
-        [(sx * x, sy * y) for sx in (-1, 1) for sy in (-1, 0, 1)],
+        [] if pad.strip_mm else [(sx * x, sy * y) for sx in (-1, 1) for sy in (-1, 0, 1)],
         PACKAGE_mm + HOLE_PLAY_mm,
         FLANGE_HIGH_mm * (1 - SQUEEZED),
         volume_mm3 / 1000,
@@ -116,8 +117,9 @@ def section(x, base_y, m, pad):
     """Across the pad, assembled; base_y: the upper side of the base plate."""
     high, low = pad.thickness_mm, m.ring_mm
     half, flange, outside = m.skin[0] / 2, m.flange[0] / 2, m.outside[0] / 2
-    lines = [text(x - outside, base_y - high - 5, "section, assembled: skin, frame, base plate")]
+    lines = [text(x - outside, base_y - high - 5, "section, assembled: skin, frame, base plate, circuit board")]
     lines.append(rectangle(x, base_y + pad.high_mm / 2, 2 * outside, pad.high_mm))
+    lines.append(rectangle(x, base_y + pad.high_mm + BOARD_mm / 2, 2 * outside, BOARD_mm))
     for sx in sorted({sx for sx, _ in pad.places}):
         lines.append(rectangle(x + sx, base_y + pad.high_mm / 2, PACKAGE_mm, pad.high_mm, "cut"))
     step = f"h{flange - half:g}"

@@ -73,7 +73,7 @@ class Board:
 
     def place(self, node, name):
         x, y, *_ = numbers(node, name)
-        return x - self.middle[0], y - self.middle[1]
+        return round(x - self.middle[0], 6), round(y - self.middle[1], 6)
 
     def read_part(self, part):
         (x, y), turns = self.place(part, "at"), int(sum(numbers(part, "at")[2:])) // 90
@@ -97,6 +97,8 @@ def expected(descriptor):
     """{(part, pad): net}, without resistors and capacitors, whose names are free; and what pulls which net up, in ohms."""
     w, of = descriptor["wiring"], of_parallel if descriptor["bus"] == "parallel" else of_multiplexed
     wires, pulls = of(w, descriptor["pull_ups_ohm"], range(w["sensor_count"]))
+    if "strip_mm" in descriptor:
+        wires = {"X0": dict(enumerate(("GND", "3V3", *pulls), 1))}
     for k in range(w["sensor_count"]):
         wires[f"U{k}"] = {1: "GND", 2: "3V3", 3: f"SCL{k}" if f"SCL{k}" in pulls else "SCL", 4: f"SDA{k}"}
     return {(part, str(pad)): net for part, own in wires.items() for pad, net in own.items()}, pulls
@@ -109,7 +111,7 @@ def of_parallel(w, ohm, sensors):
 
 
 def of_multiplexed(w, ohm, sensors):
-    cable = dict.fromkeys((1, 5, 6, 7, 8, "MP", "MP+"), "GND") | {2: "3V3", 3: "SDA", 4: "SCL"}
+    cable = dict.fromkeys((1, 8, "MP", "MP+"), "GND") | {2: "3V3", 3: "SDA", 4: "SCL"}
     wires, pulls = {"X0": cable}, dict.fromkeys(("SDA", "SCL"), ohm["bus"])
     for k in sensors:
         strip, channel = divmod(k, w["sensors_of_strip"])
@@ -146,7 +148,7 @@ def ordered(order):
 
 def wrong_orders(board, bom):
     """Order numbers of other packages or values; parts without one, or with two; marks that are not at pad 1."""
-    rows = [(name, order, value) for value, _, order, names in csv.reader(bom.splitlines()[1:]) for name in names.split(",")]
+    rows = [(name, order, value) for value, names, _, _, order in csv.reader(bom.splitlines()[1:]) for name in names.split(",")]
     values = {name: value for name, (*_, value) in board.parts.items() if value}
     errors = ["not each part is ordered once"] * (sorted(name for name, *_ in rows) != sorted(values))
     for name, order, value in rows:
@@ -158,8 +160,8 @@ def wrong_orders(board, bom):
 
 
 def rises_ns(descriptor, board):
-    """{net: its rise from 0.3 to 0.7 VDD} by pins and tracks, of a parallel board. The cable of a multiplexed one is not known."""
-    pulls = expected(descriptor)[1] if descriptor["bus"] == "parallel" else {}
+    """{net: its rise from 0.3 to 0.7 VDD} by pins and tracks, of a board that carries its Pico. Of others the cable is not known."""
+    pulls = expected(descriptor)[1] if board.picos else {}
     pF = collections.Counter()
     for (part, _), (*_, net) in board.pads.items():
         pF[net] += PIN_pF * (part[0] in "UA")

@@ -10,6 +10,7 @@ from sheet import path, text
 
 SYNC = "the [sync pin](../../host_tools/README.md#a-clock-that-cameras-share), 3.3 V; leave it open if there is no camera"
 MUX_CHANNELS, MUX_ADDRESS = 8, 0x70  # of a TCA9548A; the address with A2, A1, A0 low
+LEAST_ohm = (3.3 - 0.4) / 3e-3  # of all pull-ups of a line: UM10204 has 0.4 V at 3 mA
 SENSOR_PADS = {"GND": 1, "VDD": 2, "SCL": 3, "SDA": 4}  # of an MS5840-02BA, as public boards have them: MTL_BaroTactile_MS5840 (BUILD.md)
 
 
@@ -45,7 +46,7 @@ class Board:
 
 
 def board_of(name, descriptor, root=geometry.ROOT):
-    pad = geometry.pad(root / f"boards/pads/{descriptor['pad']}.json")
+    pad, _ = geometry.pads_of(descriptor, root)
     board = Board(name, descriptor["bus"], descriptor["wiring"], descriptor.get("pull_ups_ohm", {}), pad)
     if board.bus not in ("parallel", "multiplexed"):
         raise Unwired(f"boards/{name}/board.json: no drawing knows the bus {board.bus}; add one to boards/drawing/wiring.py")
@@ -63,6 +64,10 @@ def board_of(name, descriptor, root=geometry.ROOT):
             raise Unwired(f"boards/{name}/board.json: a Pico has no pin for GPIO {gpio}")
     if len(set(used)) != len(used):
         raise Unwired(f"boards/{name}/board.json: GPIO {next(gpio for gpio in used if used.count(gpio) > 1)} has two wires")
+    ohm = board.pull_ups_ohm
+    least_ohm = min(ohm.values()) if board.bus == "parallel" else 1 / (1 / ohm["bus"] + board.sensors / ohm["channel"])
+    if least_ohm < LEAST_ohm:
+        raise Unwired(f"boards/{name}/board.json: {least_ohm:.0f} Ohm pull a line up, all channels open; I2C allows {LEAST_ohm:.0f}")
     return board
 
 
@@ -94,8 +99,10 @@ def levels(board, strip):
 
 
 def cable(board):
-    """Of a multiplexed circuit board, by pin of its connector: 1 to 8."""
-    return ["GND", "3V3", "SDA", "SCL", *(f"RESET{strip}" for strip in range(board.strips)), *["GND"] * (4 - board.strips)]
+    """Of a strip, or of a multiplexed circuit board, by pin: 1 to 8. No net where the firmware of a larger pad drives a RESET."""
+    if board.bus == "parallel":
+        return ["GND", "3V3", "SCL", *(f"SDA{k}" for k in range(board.sensors))]
+    return ["GND", "3V3", "SDA", "SCL", *(f"RESET{strip}" for strip in range(board.strips)), *[None] * (3 - board.strips), "GND"]
 
 
 def table(board):
@@ -125,9 +132,9 @@ def table(board):
         sensors = board.sensors_of(strip)
         page += f"| {strip} | 0x{board.mux_address(strip):02x} | {', '.join(levels(board, strip))} | 0 to {len(sensors) - 1}: SDA and SCL of sensors {sensors[0]} to {sensors[-1]} |\n"
     page += "\n| pin of the connector on a circuit board | wire | pin of the Pico |\n|---|---|---|\n"
-    first, *grounds = pico.grounds()
-    ends = [first, pico.pin("3V3"), *(pico.pin(f"GP{gpio}") for gpio in gpios(board)[: 2 + board.strips]), *grounds]
-    return page + "".join(f"| {i + 1} | {wire} | {end} |\n" for i, (wire, end) in enumerate(zip(cable(board), ends)))
+    first, last, *_ = pico.grounds()
+    ends = [first, pico.pin("3V3"), *(pico.pin(f"GP{gpio}") for gpio in gpios(board)[:-1]), *["none"] * (3 - board.strips), last]
+    return page + "".join(f"| {i + 1} | {wire or 'open'} | {end} |\n" for i, (wire, end) in enumerate(zip(cable(board), ends)))
 
 
 def parts(board):
@@ -204,16 +211,11 @@ def drawn_parallel(board):
     scl_y = rows[-1] + ROW
     sync_y = scl_y + ROW
     ohm = board.pull_ups_ohm
-    lines = [
-        f'  <rect class="chip" x="30" y="40" width="150" height="{sync_y - 40 + 24}" rx="8"/>',
-        text(46, 62, "Raspberry Pi Pico", "title"),
-    ]
+    lines = [f'  <rect class="chip" x="30" y="40" width="150" height="{sync_y - 40 + 24}" rx="8"/>']
+    lines.append(text(46, 62, "Raspberry Pi Pico", "title"))
     for k, y in enumerate(rows):
-        lines += gpio(y, k, right) + [
-            path("wire", f"M{right} {y}H{at_sensor}"),
-            node(pull_x, y),
-            f'  <use href="#pullup" x="{pull_x}" y="{y}"/>',
-        ]
+        lines += gpio(y, k, right) + [path("wire", f"M{right} {y}H{at_sensor}"), node(pull_x, y)]
+        lines.append(f'  <use href="#pullup" x="{pull_x}" y="{y}"/>')
         lines += sensor(at_sensor, y, k, board.pad.part) + [
             path("scl", f"M{at_sensor + SENSOR_WIDTH} {y}H{scl_x}"),
             node(scl_x, y, "dot"),
@@ -230,10 +232,8 @@ def drawn_parallel(board):
         text(pull_x + 28, 78, f"{ohms(ohm['sda'])} each", "small"),
         text(pull_x + 28, scl_y - 10, ohms(ohm["scl"]), "small"),
     ]
-    lines += gpio(sync_y, board.wiring["pin_sync"], right) + [
-        path("reset", f"M{right} {sync_y}H240"),
-        text(248, sync_y + 4, "sync, to a camera", "small"),
-    ]
+    lines += gpio(sync_y, board.wiring["pin_sync"], right)
+    lines += [path("reset", f"M{right} {sync_y}H240"), text(248, sync_y + 4, "sync, to a camera", "small")]
     for strip in range(board.strips):
         of = board.sensors_of(strip)
         lines += [
@@ -250,10 +250,8 @@ def drawn_multiplexed(board):
     tops = [50 + (deep + 34) * strip for strip in range(board.strips)]
     sda_y, scl_y, reset_y = 140, 170, [240 + 24 * strip for strip in range(board.strips)]
     sync_y = reset_y[-1] + 30
-    lines = [
-        f'  <rect class="chip" x="20" y="80" width="140" height="{sync_y - 80 + 20}" rx="8"/>',
-        text(34, 104, "Raspberry Pi Pico", "title"),
-    ]
+    lines = [f'  <rect class="chip" x="20" y="80" width="140" height="{sync_y - 80 + 20}" rx="8"/>']
+    lines.append(text(34, 104, "Raspberry Pi Pico", "title"))
     lines += gpio(sda_y, w["pin_sda"], right, "SDA") + gpio(scl_y, w["pin_scl"], right, "SCL")
     lines += [
         path("wire", f"M{right} {sda_y}H{sda_x}"),
@@ -294,10 +292,8 @@ def drawn_multiplexed(board):
                 *sensor(at_sensor, y, k, board.pad.part),
             ]
     lines.append(text(34, sync_y + 40, f"each RESET also {ohms(ohm['reset'])} to 3V3", "small"))
-    lines += gpio(sync_y, w["pin_sync"], right, "sync") + [
-        path("reset", f"M{right} {sync_y}H200"),
-        text(206, sync_y + 4, "camera", "small"),
-    ]
+    lines += gpio(sync_y, w["pin_sync"], right, "sync")
+    lines += [path("reset", f"M{right} {sync_y}H200"), text(206, sync_y + 4, "camera", "small")]
     return picture(board, 760, max(tops[-1] + deep, sync_y + 100) + 20, lines + supply(34, sync_y + 60))
 
 

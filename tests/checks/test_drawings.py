@@ -83,6 +83,7 @@ class Wiring(unittest.TestCase):
             ("GPIO 5 has two wires", {"pin_sda": 5}),
             ("a Pico has no pin for GPIO 23", {"pin_sync": 23}),
             ("a TCA9548A has 8 channels", {"sensors_of_strip": 9}),
+            ("943 Ohm pull a line up, all channels open", {"sensor_count": 20}),
         ):
             with self.assertRaisesRegex(wiring.Unwired, words):
                 wired("multiplexed", **wires)

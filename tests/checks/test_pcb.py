@@ -75,7 +75,8 @@ PLANTS = {
         "a multiplexer without its capacitor": part("C16", lambda _: ""),
         "two wires of the connector exchanged": part("X0", exchanged("2", "3")),
     },
-    ("pico_mux_4x4", "text"): {"a wire of the connector open": part("X0", replaced(r'("7" .*) \(net .*\)\)', r"\1)"))},
+    ("pico_mux_4x4", "text"): {"a free wire of the connector on GND": part("X0", replaced(r'("7" .*)\)\)', r'\1) (net 1 "GND"))'))},
+    ("pico_parallel_strip", "text"): {"two wires of a strip exchanged": part("X0", exchanged("2", "3"))},
     ("pico_parallel", "bom"): {
         "a smaller resistor": replaced("RC0603", "RC0402"),
         "a resistor of another value ordered": replaced("-073K3L", "-073K6L"),
@@ -115,7 +116,7 @@ def board_in(folder):
     """What pcb_check.wrong takes."""
     text, bom = (next(folder.glob(f"*{end}")).read_text(encoding="utf-8") for end in (".kicad_pcb", "-bom.csv"))
     descriptor = geometry.descriptor(folder)
-    return {"text": text, "bom": bom, "descriptor": descriptor, "pad": geometry.pad(ROOT / f"boards/pads/{descriptor['pad']}.json")}
+    return {"text": text, "bom": bom, "descriptor": descriptor, "pad": geometry.pads_of(descriptor)[0]}
 
 
 BOARDS = {name: board_in(folder) for name, folder in FOLDERS.items()}
