@@ -167,7 +167,7 @@ def rises_ns(descriptor, board):
         pF[net] += PIN_pF * (part[0] in "UA")
     for x0, y0, x1, y1, _, net, _ in board.tracks:
         pF[net] += TRACK_pF_mm * math.dist((x0, y0), (x1, y1))
-    return {net: 0.847 * ohm * pF[net] / 1000 for net, ohm in pulls.items()}
+    return {net: round(0.847 * ohm * pF[net] / 1000, 1) for net, ohm in pulls.items()}
 
 
 def places(board, pad):
