@@ -8,7 +8,7 @@ from sheet import number
 
 MIDDLE_mm = 100  # of the pad, on KiCad's sheet
 HOLE_FREE_mm = 0.1  # around a hole, beside the clearance of tracks
-FONT = "(effects (font (size 0.7 0.7) (thickness 0.12))"
+FONT = "(effects (font (size 1 1) (thickness 0.15))"
 LAYERS = (
     '(0 "F.Cu" signal) (31 "B.Cu" signal) (34 "B.Paste" user) (35 "F.Paste" user) (36 "B.SilkS" user) (37 "F.SilkS" user) (38 "B.Mask" user) '
     '(39 "F.Mask" user) (44 "Edge.Cuts" user) (46 "B.CrtYd" user) (47 "F.CrtYd" user) (48 "B.Fab" user) (49 "F.Fab" user)'
@@ -30,14 +30,14 @@ def zone(net, layers, fill, rectangle):
 def footprint(part, numbers):
     land, side = part.land, "B" if part.back else "F"
     turn, mirror = f" {part.turn}" if part.turn else "", " (justify mirror)" if part.back else ""
+    flip = -1 if part.back else 1  # as KiCad flips a part
     kind = "smd" if part.value else "exclude_from_pos_files exclude_from_bom"
     yield f'  (footprint "{land.kicad}" (layer "{side}.Cu") (at {at(part.x, part.y)}{turn}) (attr {kind})'
     text = lambda kind, words, y, on: f'    (fp_text {kind} "{words}" (at 0 {number(y)}) (layer "{side}.{on}") {FONT}{mirror}))'
-    yield text("reference", part.name, -land.bottom - 0.6, "Fab" if turn or not land.pads else "SilkS")
+    yield text("reference", part.name, flip * (-land.bottom - 0.6), "Fab" if turn or not land.pads else "SilkS")
     yield text("value", part.value, 0, "Fab")
     corners = f"(start {number(-land.right)} {number(-land.bottom)}) (end {number(land.right)} {number(land.bottom)})"
     yield from (f'    (fp_rect {corners} (layer "{each}.CrtYd") (width 0.05) (fill none))' for each in (side if land.pads else "FB"))
-    flip = -1 if part.back else 1  # as KiCad flips a part
     if len(land.pads) > 2:
         _, x, y, w, _ = land.pads[0]
         dot = f"(center {number(x - w / 2 - 0.35)} {number(flip * y)}) (end {number(x - w / 2 - 0.25)} {number(flip * y)})"

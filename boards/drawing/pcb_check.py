@@ -17,6 +17,7 @@ NEAR_mm = 4  # a capacitor to its part, from pad to pad
 PIN_pF, TRACK_pF_mm = 10, 0.1  # a pin, as UM10204 allows at most; a track over a plane 1.6 mm below (a guess: none was measured)
 PADS_mm = {"1": (-1, -1), "2": (-1, 1), "3": (1, 1), "4": (1, -1)}  # of a sensor, from its middle; y down
 PICO_mm = 17.78 / 2 + 0.9, 2.54  # its pads' rows on the back, USB at the top: from its middle, and pitch
+SIZES_mm = {"U": (1.3, 1.3), "A": (3.5, 1.7)}  # of the pads of these
 # Order numbers: what the name of the part's land has, and its value.
 ORDERS = {
     "MS5840-02BA01": ("MS5837-xxBA", "MS5840-02BA"),
@@ -162,12 +163,10 @@ def wrong_orders(board, bom):
 def rises_ns(descriptor, board):
     """{net: its rise from 0.3 to 0.7 VDD} by pins and tracks, of a board that carries its Pico. Of others the cable is not known."""
     pulls = expected(descriptor)[1] if board.picos else {}
-    pF = collections.Counter()
-    for (part, _), (*_, net) in board.pads.items():
-        pF[net] += PIN_pF * (part[0] in "UA")
+    pins, mm = collections.Counter(net for (part, _), (*_, net) in board.pads.items() if part[0] in "UA"), collections.Counter()
     for x0, y0, x1, y1, _, net, _ in board.tracks:
-        pF[net] += TRACK_pF_mm * math.dist((x0, y0), (x1, y1))
-    return {net: round(0.847 * ohm * pF[net] / 1000, 1) for net, ohm in pulls.items()}
+        mm[net] += math.dist((x0, y0), (x1, y1))
+    return {net: round(0.847e-3 * ohm * (PIN_pF * pins[net] + TRACK_pF_mm * mm[net]), 1) for net, ohm in pulls.items()}
 
 
 def places(board, pad):
@@ -180,17 +179,17 @@ def places(board, pad):
 
 
 def wrong_places(board, pad):
-    off_mm = {key: math.dist(board.pads.get(key, (math.inf, math.inf))[:2], place) for key, place in places(board, pad).items()}
-    errors = [f"pad {name} of {part} is {mm:.3f} mm off" for (part, name), mm in off_mm.items() if mm > 0.001]
+    right = {key: place + SIZES_mm[key[0][0]] for key, place in places(board, pad).items()}
+    off = {key: math.dist(board.pads.get(key, [math.inf] * 4)[:4], place) for key, place in right.items()}
+    errors = [f"pad {name} of {part} is {mm:.3f} mm off, or as much wider or longer" for (part, name), mm in off.items() if mm > 0.001]
     for k, (x, y) in enumerate(pad.places):
         errors += [f"a via under sensor {k}" for vx, vy in board.vias if max(abs(vx - x), abs(vy + y)) < VIA_FREE_mm]
     measures = mould.measures(pad)
     holes = [(x, -y, mould.SCREW_mm) for x, y in measures.screws]
     holes += [(x + side * dx, y + dy, mm) for x, y in board.picos for dx, dy, mm in LEGS_mm for side in (-1, 1)]
-    if sorted(board.holes) != sorted(holes):
-        errors.append("the holes are not those of the base plate and of the Pico")
-    if board.outline != tuple(tuple(sign * mm / 2 for mm in measures.outside) for sign in (-1, 1)):
-        errors.append(f"the outline is {board.outline}, not the base plate's")
+    errors += ["the holes are not those of the base plate and of the Pico"] * (sorted(board.holes) != sorted(holes))
+    outline = tuple(tuple(sign * mm / 2 for mm in measures.outside) for sign in (-1, 1))
+    errors += [f"the outline is {board.outline}, not {outline}"] * (board.outline != outline)
     tracks = [tuple(sorted((track[:2], track[2:4]))) + track[4:] for track in board.tracks]
     return errors + [f"two tracks lie on each other at {track[0]}" for track in sorted(set(tracks)) if tracks.count(track) > 1]
 
@@ -200,5 +199,6 @@ def wrong(text, bom, descriptor, pad):
     board = Board(text)
     slow = [(net, ns) for net, ns in rises_ns(descriptor, board).items() if ns > descriptor["rise_ns"][net[:3].lower()]]
     errors = [f"{net} rises in {ns:.0f} ns, more than its rise_ns" for net, ns in slow]
+    errors += ["print is not 1 mm high in lines of 0.15 mm"] * bool(re.search(r"SilkS.*\(font .(?!size 1 1. .thickness 0.15\))", text))
     errors += [f"{name} is {part[-1]}, not {pad.part}" for name, part in board.parts.items() if name[0] == "U" and part[-1] != pad.part]
     return errors + wrong_nets(descriptor, board) + wrong_places(board, pad) + wrong_orders(board, bom)
