@@ -37,6 +37,7 @@ def plotted(board, folder):
     options = plotter.GetPlotOptions()
     options.SetOutputDirectory(str(folder))
     options.SetUseAuxOrigin(True)
+    options.SetDrillMarksType(0)  # none: print would have them, too
     for layer in LAYERS:
         plotter.SetLayer(getattr(pcbnew, layer))
         plotter.OpenPlotfile(layer, pcbnew.PLOT_FORMAT_GERBER, layer)

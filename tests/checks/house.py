@@ -55,7 +55,7 @@ LIMITS = {
     "private_words": (14, 14),
     "unformatted_files": (0, 0),
     "longest_function_lines": (60, 60),
-    "board_lines": (898, 898),
+    "board_lines": (899, 899),
     "app_ifs": (1, 1),
 }
 APART = ("firmware/fit/", "firmware/condition/")  # from longest_file
