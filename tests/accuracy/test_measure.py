@@ -12,6 +12,8 @@ import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/measure", "python")]
+from fingertip import InputError  # noqa: E402
+from fingertip.arrays import table_of  # noqa: E402
 from measure import Measure, MeasureError, q10, stream_of, usable_of  # noqa: E402
 
 MEASURE = Measure(sys.argv.pop())
@@ -74,8 +76,20 @@ class Fit(unittest.TestCase):
             MEASURE.call("fit", "fit", 2, ARRAY, settings, MEASURE.no_own, readings, np.full(4, ALL, np.uint64), fixed, np.zeros(1))
         with self.assertRaisesRegex(MeasureError, "fit: another number of arguments"):
             MEASURE.call("fit", "fit")
-        with self.assertRaisesRegex(MeasureError, "no such entry point"):
-            MEASURE.call("none")
+        for of_other_version in (MEASURE.call, MEASURE.made):
+            with self.assertRaisesRegex(MeasureError, "knows no none: it is of another version than this package"):
+                of_other_version("none")
+        finder, found, solved = np.zeros(1, np.int64), MEASURE.made("found_placement", 1), MEASURE.made("solved_placements", 1)
+        MEASURE.call("finder_new", 15, finder)
+        for name, *values in (
+            ("finder_new", 42, finder),
+            ("finder_take", int(finder[0]), 0.0, 0, np.zeros((2, 14)), np.zeros(3, np.int64), found, np.zeros((2, 15))),
+            ("solve_placements", np.arange(42.0), np.zeros(42), 9.0, 3.0, found, np.ones((1, 2, 42)), solved, np.zeros((2, 42))),
+        ):
+            with self.assertRaisesRegex(MeasureError, "number of sensors"):
+                MEASURE.call(name, *values)
+        with self.assertRaisesRegex(InputError, "not as many in each row"):
+            table_of([[1.0, 2.0], [3.0]])
         with self.assertRaisesRegex(MeasureError, "build it"):
             Measure(MEASURE.build / "none")
 

@@ -14,6 +14,7 @@ import pathlib
 import numpy as np
 
 from .errors import InputError
+from .version import __version__
 
 ARRAY_OF_SHAPE = 4  # dimensions at most
 
@@ -74,12 +75,17 @@ class Library:
 
     def __init__(self, path):
         try:
-            self.library = ctypes.CDLL(str(path))
+            self.path, self.library = path, ctypes.CDLL(str(path))
         except OSError as error:
             raise MeasureError(f"{path}: {error}; build it: cmake --build --preset host") from None
         for name in ("measure_failure", "measure_records"):
-            getattr(self.library, name).restype = ctypes.c_char_p
+            self._known(name, getattr(self.library, name, None)).restype = ctypes.c_char_p
         self.records = dict(dtype_of(line) for line in self.library.measure_records().decode().splitlines())
+
+    def _known(self, name, found):
+        if found is None:
+            raise MeasureError(f"{self.path}: knows no {name}: it is of another version than this package, which is {__version__}")
+        return found
 
     def call(self, name, *values):
         values = [
@@ -87,16 +93,20 @@ class Library:
             for value in values
         ]
         arguments = (Argument * len(values))(*(argument_of(value) for value in values))
-        try:
-            entry = getattr(self.library, f"measure_{name}")
-        except AttributeError:
-            raise MeasureError(f"{name}: there is no such entry point") from None
-        if entry(arguments, ctypes.c_int64(len(values))):
+        if self._known(name, getattr(self.library, f"measure_{name}", None))(arguments, ctypes.c_int64(len(values))):
             raise MeasureError(self.library.measure_failure().decode())
 
     def made(self, record, *shape):
         """A new array of such records, all zeros."""
-        return np.zeros(shape, self.records[record])
+        return np.zeros(shape, self._known(record, self.records.get(record)))
+
+
+def table_of(rows):
+    """Readings, a row for each. Raises InputError."""
+    try:
+        return np.array(rows, float)
+    except (TypeError, ValueError):
+        raise InputError("readings are no numbers, or not as many in each row") from None
 
 
 def q10(value_Pa):

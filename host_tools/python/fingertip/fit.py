@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from .arrays import Firmware, MeasureError, q10, round_half_away, usable_of
+from .arrays import Firmware, MeasureError, q10, round_half_away, table_of, usable_of
 from .errors import InputError
 from .files import printable, reporter, run_tool, write_text
 from .line import Flag
@@ -155,7 +155,7 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
     pad, warns of what makes that unlikely."""
     if unit not in UNITS:
         raise InputError(f"{printable(unit)} is no unit; give one of {', '.join(UNITS)}")
-    table = UNITS[unit] * np.asarray(pressures, float)
+    table: FloatArray = UNITS[unit] * table_of(pressures)
     if table.ndim != 2 or table.shape[1] != len(pad.x_mm):
         raise InputError(
             f"pressures are {' x '.join(map(str, table.shape))}, and pad {pad.name} has {len(pad.x_mm)} sensors: rows x {len(pad.x_mm)}"

@@ -20,7 +20,7 @@ MEASURE_RECORD(found_placement, FIELD(t_s), FIELD(noise_Pa), FIELD(fading), FIEL
 // force_scale: 0 where there is none.
 struct solved_placements {
   bool solved;
-  char judgement[256];
+  char judgement[512];
   double peak_Pa, width_mm, mixing, dip, dip_share, dip_sd_mm; // as Solution has them
   double sigma_mm, thickness_mm, thickness_sd_mm, force_scale, force_ratio;
 };
@@ -29,6 +29,7 @@ MEASURE_RECORD(solved_placements, FIELD(solved), FIELD(judgement), FIELD(peak_Pa
                FIELD(force_ratio))
 
 static void finder_new(std::int64_t sensors, Batch<std::int64_t, 1> finder) {
+  require(sensors > 0 && sensors <= FT_MAX_SENSORS && finder.size() == 1, "no number of sensors");
   finder[0] = reinterpret_cast<std::intptr_t>(new PlacementFinder(static_cast<std::size_t>(sensors)));
 }
 MEASURE_ENTRY(finder_new)
@@ -41,6 +42,9 @@ MEASURE_ENTRY(finder_free)
 static void finder_take(std::int64_t finder, double t_s, std::int64_t valid, Batch<const double, 2> frame, Batch<std::int64_t, 1> state,
                         Batch<found_placement, 1> found, Batch<double, 2> levels) {
   auto &placements = *reinterpret_cast<PlacementFinder *>(static_cast<std::intptr_t>(finder));
+  const std::size_t sensors = placements.above_Pa().size();
+  require(frame.size() == 2 && frame.size(1) == sensors && levels.size() == 2 && levels.size(1) == sensors, "another number of sensors");
+  require(state.size() == 3 && found.size() == 1, "no room for what is found");
   const auto row = [&](std::size_t i) { return std::vector<double>(frame.row(i), frame.row(i) + frame.size(1)); };
   const auto placement = placements.take({t_s, static_cast<sensor_map>(valid), row(0), row(1)});
   state[0] = static_cast<std::int64_t>(placements.state());
@@ -61,7 +65,9 @@ static void solve_placements(Batch<const double, 1> x_mm, Batch<const double, 1>
   same_length(x_mm, y_mm);
   same_length(placements, levels);
   const std::size_t sensors = x_mm.size();
+  require(sensors > 0 && sensors <= FT_MAX_SENSORS, "no number of sensors");
   require(levels.size(1) == 2 && levels.size(2) == sensors && gains.size(1) == sensors, "another number of sensors");
+  require(solved.size() == 1 && gains.size() == 2, "no room for what is found");
   const Array array{pitch_mm, {x_mm.data, x_mm.data + sensors}, {y_mm.data, y_mm.data + sensors}};
   std::vector<Placement> all(placements.size());
   for (std::size_t i = 0; i < all.size(); i++) {

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays import table_of
 from ..errors import InputError
 from ..fit import firmware
 from ..line import Capability, Stored
@@ -91,7 +92,7 @@ def solve_gains(array, placements, force_N):
     for name in ("t_s", "noise_Pa", "fading"):
         found[name] = [getattr(one, name) for one in placements]
     found["usable"] = [bits_of(one.usable) for one in placements]
-    levels = np.array([(one.reading_Pa, one.rest_Pa) for one in placements]).reshape(-1, 2, array.sensors)
+    levels = table_of([(one.reading_Pa, one.rest_Pa) for one in placements] or np.zeros((0, 2, array.sensors)))
     gains = np.zeros((2, array.sensors))
     library.call("solve_placements", array.x_mm, array.y_mm, array.pitch_mm, force_N, found, levels, solved, gains)
     return solved[0], gains

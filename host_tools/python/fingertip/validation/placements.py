@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..arrays import table_of
 from ..fit import firmware
 
 FRAME_RATE_MIN_Hz = 12.0
@@ -51,7 +52,7 @@ class PlacementFinder:
 
     def take(self, reading):
         """The placement that this frame completes."""
-        frame = np.array([reading.pressure_Pa, reading.zero_Pa])
+        frame = table_of([reading.pressure_Pa, reading.zero_Pa])
         self._call("finder_take", self._finder, reading.t_s, bits_of(reading.valid), frame, self._state, self._found, self._levels)
         self.state, self.refusal = _STATES[self._state[0]], _REFUSALS[self._state[1]]
         if not self._state[2]:
