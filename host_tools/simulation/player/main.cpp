@@ -15,6 +15,7 @@
 #include "tool/calibration/from_recording.hpp"
 
 extern "C" {
+#include "config/defaults.h"
 #include "native/native_cdc.h"
 #include "native/native_port.h"
 }
@@ -133,8 +134,11 @@ int play(const PlayOptions &options) {
   std::vector<WantedSetting> more;
   std::transform(options.settings.begin(), options.settings.end(), std::back_inserter(more), setting_from_text);
   std::vector<wire_packet> wanted;
+  wire_info now{}; // what travels with a setting
+  now.slip_threshold_mm = DEFAULT_SLIP_THRESHOLD_mm;
+  now.slip_window_ms = DEFAULT_SLIP_WINDOW_ms;
   for (const auto &settings : {std::vector{setting_from_text("osr=" + options.osr)}, {setting_from_text("rate=" + options.rate)}, more}) {
-    const std::vector<wire_packet> commands = setting_commands(settings, {});
+    const std::vector<wire_packet> commands = setting_commands(settings, now);
     wanted.insert(wanted.end(), commands.begin(), commands.end());
   }
   std::optional<pad_profile> pad;

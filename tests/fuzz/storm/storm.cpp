@@ -1,5 +1,6 @@
 #include "storm.hpp"
 
+#include "config/defaults.h"
 #include "libfingertip/command.hpp"
 #include "libfingertip/text.hpp"
 #include "support/pad.h"
@@ -37,7 +38,7 @@ constexpr Target ON_THE_LINE[] = {
 
 static wire_packet set(const std::string &text) {
   wire_info now{};
-  now.slip_window_ms = 50; // travels with the threshold
+  now.slip_window_ms = DEFAULT_SLIP_WINDOW_ms; // travels with the threshold
   return fingertip::setting_commands({fingertip::setting_from_text(text)}, now)[0];
 }
 

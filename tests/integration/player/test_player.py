@@ -77,7 +77,9 @@ class Player(unittest.TestCase):
             told = recording.flag(files.TANGENTIAL_VALID)
             self.assertGreater(told.sum(), 300)
             self.assertEqual(set(recording.flag(files.TANGENTIAL_FROM_TOUCH)[told]), {from_touch})
-        self.assertFalse(files.read_recording(self.play("plain.csv")).flag(files.TANGENTIAL_VALID).any())
+        plain = files.read_recording(self.play("plain.csv", "--set", "slip_threshold=0.5"))
+        self.assertEqual([plain.metadata[f"slip_{key}"] for key in ("threshold_mm", "window_ms")], ["0.5", "100"])
+        self.assertFalse(plain.flag(files.TANGENTIAL_VALID).any())
 
     def test_a_recording_stays(self):
         recording = self.play("kept.csv", "--seconds", "1")
