@@ -40,13 +40,13 @@ def fixed_point(value, scale, digits):
 def contact_text(t_us, frame, value):
     flags = int(value("flags"))
     cells = [quantity(name, value(name), flags) if name in FLAG_OF else str(int(value(name))) for name in CONTACT]
-    return {"contact": ",".join([str(int(t_us)), str(int(frame)), *cells]) + "," * len(RAW_COLUMNS)}
+    return {"contact": ",".join([str(min(int(t_us), 2**64 - 1)), str(int(frame)), *cells]) + "," * len(RAW_COLUMNS)}
 
 
 def raw_text(t_us, frame, value, pressures_Pa, tares_Pa):
     cells = [fixed_point(value(name), 100, 2) if name == "temperature_degC" else str(int(value(name))) for name in RAW_COLUMNS]
     cells += [fixed_point(pressure_Pa, 1024, 4) for pressure_Pa in (*pressures_Pa, *tares_Pa)]
-    return {"raw": ",".join([str(int(t_us)), str(int(frame)), *len(CONTACT) * [""], *cells])}
+    return {"raw": ",".join([str(min(int(t_us), 2**64 - 1)), str(int(frame)), *len(CONTACT) * [""], *cells])}
 
 
 def info_of(metadata):

@@ -7,6 +7,7 @@ A job is {"name", "kind": "recording" | "stream" | "setting", "input": path or t
 import bz2
 import gzip
 import io
+import itertools
 import json
 import lzma
 import pathlib
@@ -133,6 +134,7 @@ def csv_cases(corpus, name, text, devices):
     add("whole", text)
     for what, end in {"crlf": b"\r\n", "crcrlf": b"\r\r\n", "cr_only": b"\r"}.items():
         add(what, text.replace(b"\n", end), f"{name}_whole")
+    add("devices_with_commas", text.replace(b"AAAA BBBB", b"AAAA, BBBB"), f"{name}_whole")
     add("no_end_line", lines[:-1])
     add("no_line_end", text[:-1])
     for cut in (1, 20, len(lines[row])):
@@ -218,7 +220,7 @@ def joint_cases(corpus, text):
     changes += [("0,", "AAAA,"), ("0,1000.5,41177,", "0,1000.5#"), ("1,2000.5,2990954", "1,2000.5,x"), ("0,1000.5,41177", "0")]
     for number, change in enumerate(changes):
         add(f"row_{number}", [line.replace(*change, 1) if line.startswith(change[0]) else line for line in lines])
-    of_one = ("0/end: frames", "1/end: frames", "9/event: x", "00/event: x", "0/a/b: c")
+    of_one = ("0/end: frames", "1/end: frames", "9/event: x", "00/event: x", "0/a/b: c", "pad 3/4: x")
     for number, comment in enumerate((*of_one, "end: frames", "event: x", "note: 0/event: c", "grip: x", "packet: info sequence=1 t_us=1")):
         add(f"comment_{number}", [*lines[: header + 1], f"# {comment}", *lines[header + 1 :]])
 
@@ -259,6 +261,12 @@ def rewritten(corpus, bag, order=list, only="", pack=bytes, **options):
     return path.read_bytes()
 
 
+def in_frames(data):
+    """Of zstd, without their sizes."""
+    pack = zstandard.ZstdCompressor(write_content_size=False).compress
+    return pack(data[:9]) + pack(data[9:])
+
+
 def cases_by_others(corpus, name, bag, devices):
     """A recording that went through tools of others."""
     prng = random.Random(name)
@@ -269,6 +277,11 @@ def cases_by_others(corpus, name, bag, devices):
         return sum(blocks, [])
 
     corpus.recording(f"{name}_whole", bag.read_bytes(), "mcap", devices)
+    count = itertools.count(1)
+
+    def broken(data):
+        return zstandard.compress(data)[: -1 if next(count) % 9 == 0 else None]
+
     unindexed = {"index_types": mcap.writer.IndexType.NONE, "use_statistics": False, "use_summary_offsets": False}
     for what, how in {
         "by_time": {},
@@ -280,6 +293,9 @@ def cases_by_others(corpus, name, bag, devices):
         "one_chunk": {"chunk_size": 10**9},
         "no_chunks_by_time": {"use_chunking": False},
         "messages_packed": {"pack": zstandard.compress},
+        "messages_in_frames": {"pack": in_frames},
+        "messages_broken": {"pack": broken},
+        "topics_broken": {"only": "contact", "pack": broken},
         "topics_only": {"only": "/(contact|wrench|place|pressures)$|diagnostics"},
         "topics_only_no_chunks": {"only": "/(contact|wrench|place|pressures)$", "use_chunking": False},
         "topics_packed": {"only": "contact|pressures", "pack": zstandard.compress},
@@ -290,9 +306,14 @@ def cases_by_others(corpus, name, bag, devices):
         "lines_alone": {"only": "lines"},
     }.items():
         data = rewritten(corpus, bag, **how)
-        is_whole = not re.search("alone|topics_back", what) and (name == "one_bag" or "topics" not in what)
+        is_whole = not re.search("alone|topics_back|broken", what) and (name == "one_bag" or "topics" not in what)
         corpus.recording(f"{name}_{what}", data, "mcap", devices, f"{name}_whole", is_whole)
         corpus.recording(f"{name}_{what}_cut", data[: len(data) * 2 // 3], "mcap", devices, f"{name}_whole", False)
+        if what == "topics_only":
+            chunk = make_reader(io.BytesIO(data)).get_summary().chunk_indexes[-2]
+            at = chunk.chunk_start_offset + chunk.chunk_length - 9
+            damaged = data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
+            corpus.recording(f"{name}_{what}_damaged", damaged, "mcap", devices, f"{name}_whole", False)
         if what == "topics_backwards":  # an index that lacks a chunk
             at = data.rindex(struct.pack("<Q", make_reader(io.BytesIO(data)).get_summary().chunk_indexes[9].chunk_start_offset)) - 25
             corpus.recording(f"{name}_unlisted", data[:at] + b"\x7f" + data[at + 1 :], "mcap", devices, f"{name}_whole", False)

@@ -59,9 +59,10 @@ def lost(jobs, found):
     """Recordings that were refused although all of their rows are there, and those that lack rows and whose reader reports no loss."""
     refused, silent = [], []
     refused += [job["name"] for job in jobs if "part" in job and len(found[job["name"]].get("rows", ())) != job["part"][2]]
-    refused += [
-        job["name"] for job in jobs if "rows" in job and not job["salvage"] and len(found[job["name"]].get("rows", ())) != job["rows"]
-    ]
+    for job in (job for job in jobs if "rows" in job and not job["salvage"]):
+        answer = found[job["name"]]
+        is_right = len(answer.get("rows", ())) == job["rows"] if job["rows"] else "refused" in answer
+        refused += [job["name"]] * (not is_right)
     for job in (job for job in jobs if "rows_of" in job):
         answer, rows = found[job["name"]], found[job["rows_of"]]["rows"]
         refused += [job["name"]] * (job["is_whole"] and answer.get("rows") != rows)

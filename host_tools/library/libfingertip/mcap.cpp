@@ -162,7 +162,7 @@ std::string unpacked(std::string_view compression, std::string_view packed, std:
     throw Damage("compression \"" + std::string(compression.substr(0, 20)) + "\" is unknown");
   }
   std::string bytes(static_cast<std::size_t>(size), '\0');
-  if (!unpack(packed, bytes)) {
+  if (unpack(packed, bytes) != size) {
     throw Damage("a chunk cannot be unpacked");
   }
   return bytes;
@@ -275,23 +275,6 @@ void Writer::finish() {
   std::string end = summary + offsets + bytes_of(static_cast<std::uint8_t>(FOOTER), FOOTER_BYTES, start, start + summary.size());
   put_number(end, crc_of(end));
   append(data_end + end + std::string(MAGIC, sizeof MAGIC));
-}
-
-std::optional<std::uint64_t> declared_size(std::string_view frame) {
-  constexpr std::string_view BEGIN = "\x28\xb5\x2f\xfd";
-  constexpr std::size_t DICTIONARY_bytes[] = {0, 1, 2, 4};
-  const auto byte = [&](std::size_t at) -> std::uint64_t { return at < frame.size() ? static_cast<unsigned char>(frame[at]) : 0; };
-  const std::uint64_t descriptor = byte(BEGIN.size()), width = descriptor >> 6;
-  const bool is_single = (descriptor >> 5 & 1) != 0;
-  if (frame.substr(0, BEGIN.size()) != BEGIN || (width == 0 && !is_single)) {
-    return std::nullopt;
-  }
-  const std::size_t begin = BEGIN.size() + 1 + !is_single + DICTIONARY_bytes[descriptor & 3];
-  std::uint64_t size = width == 1 ? 256 : 0;
-  for (std::size_t i = 0; i < std::size_t{1} << width; i++) {
-    size += byte(begin + i) << (8 * i);
-  }
-  return size;
 }
 
 bool Reader::next(Message &message) {

@@ -26,10 +26,8 @@ inline constexpr std::size_t RECORD_HEAD_BYTES = 9; /* opcode and length */
 /* How chunks are packed: mcap_compression.cpp here, another file in the page. */
 extern const char *const COMPRESSION; /* of packed(), its name in the file */
 std::string packed(const std::string &bytes);
-/* By zstd; false unless exactly the bytes that `to` has room for come of it. */
-bool unpack(std::string_view packed, std::string &to);
-/* The content size that a zstd frame declares (RFC 8878, 3.1.1.1); nothing: it declares none, or is no such frame. */
-std::optional<std::uint64_t> declared_size(std::string_view frame);
+/* All frames of zstd in it; how many bytes come of them, or nothing where they are damaged, or `to` has no room for all. */
+std::optional<std::size_t> unpack(std::string_view packed, std::string &to);
 
 using Pairs = std::vector<std::pair<std::string, std::string>>;
 

@@ -18,8 +18,9 @@ std::string packed(const std::string &bytes) {
   return packed;
 }
 
-bool unpack(std::string_view packed, std::string &to) {
-  return ZSTD_decompress(to.data(), to.size(), packed.data(), packed.size()) == to.size();
+std::optional<std::size_t> unpack(std::string_view packed, std::string &to) {
+  const std::size_t length = ZSTD_decompress(to.data(), to.size(), packed.data(), packed.size());
+  return ZSTD_isError(length) ? std::nullopt : std::optional(length);
 }
 
 } // namespace fingertip::mcap

@@ -20,7 +20,8 @@ constexpr const char *PERIODIC_LINES = "/fingertip/lines/periodic"; /* those tha
 constexpr const char *PRESSURES = "sensor_msgs/PointCloud2";
 constexpr std::uint64_t PERIOD_ns = 10'000'000;       /* each has the wrench, location and pressures of one row at most */
 constexpr std::size_t WAITING_MOST = 1 << 16;         /* lines for one before them, before it counts as lost: 50 s, 50 MB */
-constexpr std::uint64_t MESSAGE_MOST_bytes = 1 << 20; /* packed by itself */
+constexpr std::size_t MESSAGE_MOST_bytes = 1 << 20;   /* packed by itself */
+constexpr std::string_view ZSTD = "\x28\xb5\x2f\xfd"; /* begins what it packs */
 
 /* Parses a time of a recording to ns since 1970. */
 static std::optional<std::uint64_t> utc_ns(const std::string &text) {
@@ -179,8 +180,7 @@ void McapLineSink::begin() {
     return found == keys.end() ? std::string() : found->second;
   };
   joint_ = head[0] == std::string(FIRST_WORDS) + FORMAT_OF_SEVERAL;
-  const std::string serials = value(joint_ ? "devices" : "serial");
-  for (std::string_view serial : split(serials, joint_ ? ' ' : '\0')) {
+  for (const std::string &serial : joint_ ? serials_in(value("devices")) : std::vector{value("serial")}) {
     Device &device = devices_.emplace_back();
     device.serial = serial;
     device.frame_id = "fingertip_" + ros::name_in_ros(device.serial);
@@ -367,12 +367,13 @@ void McapLineSource::take(mcap::Reader::Message message) {
   if (!is_contact && message.type != LINE) {
     return;
   }
-  if (const auto size = mcap::declared_size(message.data)) { /* of a recorder that packs each message */
-    std::string plain(std::min(*size, MESSAGE_MOST_bytes), '\0');
-    if (!mcap::unpack(message.data, plain)) {
+  if (message.data.compare(0, ZSTD.size(), ZSTD) == 0) { /* of a recorder that packs each message */
+    unpacked_.resize(MESSAGE_MOST_bytes);
+    const auto size = mcap::unpack(message.data, unpacked_);
+    if (!size) {
       throw mcap::Damage("a message on " + printable(message.topic) + " cannot be unpacked");
     }
-    message.data = std::move(plain);
+    message.data.assign(unpacked_, 0, *size);
   }
   if (is_contact && topic_.empty() && !reader_.knows(LINE)) {
     make_head(message);

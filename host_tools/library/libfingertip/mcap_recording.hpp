@@ -117,6 +117,7 @@ private:
   int sets_ = 0;                                /* of columns that came later, as in the header */
   bool has_first_ = false, has_header_ = false; /* lines seen */
   bool reported_torn_ = false;
+  std::string unpacked_; /* a message; room for any */
 };
 
 } // namespace fingertip

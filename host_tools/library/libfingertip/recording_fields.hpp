@@ -31,6 +31,19 @@ inline constexpr const char *PACKET_INFO = "info";
 inline constexpr const char *PACKET_ACK = "ack";
 inline constexpr const char *PACKET_SYNC = "sync";
 inline constexpr double Q10 = 1024.0;
+
+/* Of a joint recording's fingertips, "A B"; people write "A, B". */
+inline std::vector<std::string> serials_in(std::string text) {
+  std::replace(text.begin(), text.end(), ',', ' ');
+  std::vector<std::string> found;
+  for (std::string_view word : split(text, ' ')) {
+    if (!word.empty()) {
+      found.emplace_back(word);
+    }
+  }
+  return found;
+}
+
 struct Namer {
   std::string text;
   template <typename Value> void operator()(const std::string &name, const Value &) { text += "," + name; }

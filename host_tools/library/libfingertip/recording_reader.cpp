@@ -17,6 +17,7 @@ using namespace recording;
 namespace {
 
 constexpr std::string_view OUR_FILES = "# fingertip-";
+constexpr std::size_t DAMAGES_MOST = 20; /* that are reported one by one */
 
 /* Makes of a line what it was before a spreadsheet saved it: between semicolons, tabs or commas, with quotes, blanks and decimal commas,
  * and filled up with empty cells. */
@@ -25,15 +26,18 @@ public:
   void restore(LineSource::Line &line) {
     std::string &text = line.text;
     const bool is_quoted = text.rfind("\"#", 0) == 0;
-    const std::size_t filled = text.find_last_not_of(is_quoted ? ",;\t\"" : ",;\t") + 1;
+    std::size_t end = is_quoted; /* of the quotes */
+    std::string quoted;
+    for (; is_quoted && end < text.size() && (text[end] != '"' || text.compare(++end, 1, "\"") == 0); end++) {
+      quoted += text[end];
+    }
+    const std::size_t filled = std::max(end, text.find_last_not_of(is_quoted ? ",;\t\"" : ",;\t") + 1);
     fill_ = line.number == 1 ? text.substr(filled) : fill_;
     is_one_ = is_one_ || is_quoted || !fill_.empty();
     if (is_quoted || text.rfind('#', 0) == 0) {
-      line.torn = line.torn && (fill_.empty() || text.substr(filled) != fill_);
-      text = text.substr(is_quoted, (is_quoted || !fill_.empty() ? filled : text.size()) - is_quoted);
-      for (std::size_t at = 0; is_quoted && (at = text.find("\"\"", at)) != std::string::npos; at++) {
-        text.erase(at, 1);
-      }
+      const bool has_end = is_quoted ? std::count(text.begin(), text.end(), '"') % 2 == 0 : !fill_.empty();
+      line.torn = line.torn && !(has_end && text.substr(filled) == fill_);
+      text = quoted + text.substr(end, (is_quoted || !fill_.empty() ? filled : text.size()) - end);
       if (separator_ != ',' && !is_quoted && text.find(separator_) != std::string::npos) { /* cells, as a grasp's */
         text = plain(text);
       }
@@ -343,11 +347,15 @@ std::optional<RecordingReader::Item> RecordingReader::next() {
 /* False at the end. */
 bool RecordingReader::read_next() {
   LineSource::Line line;
-  auto damaged = [&](const std::string &what, std::uint64_t lines) {
-    if (!salvage_ || !state_.header_seen) {
-      throw Error(state_.header_seen ? ErrorCode::damaged_line : ErrorCode::damaged_head, what);
+  auto damaged = [&](const std::string &what, std::uint64_t lines, bool is_comment = false) {
+    const bool can_be_skipped = state_.header_seen || is_comment;
+    if (!salvage_ || !can_be_skipped) {
+      throw Error(can_be_skipped ? ErrorCode::damaged_line : ErrorCode::damaged_head, what);
     }
     state_.skipped_lines += lines;
+    if (state_.damages.size() < DAMAGES_MOST) {
+      state_.damages.push_back(what);
+    }
   };
   try {
     if (!source_->next(line)) {
@@ -357,13 +365,14 @@ bool RecordingReader::read_next() {
     if (error.code() != ErrorCode::damaged_line) {
       throw;
     }
-    damaged(error.what(), 0); /* the next line's number shows how many lines are lost */
+    damaged(error.what(), 1); /* the next line's number may show that more are lost */
+    state_.unplaced++;
     return true;
   }
   auto place = [&] { return path_ + ":" + std::to_string(line.number) + ": "; };
   if (line.number > state_.line_number + 1 + line.left_out) {
     std::uint64_t lost = line.number - state_.line_number - 1 - line.left_out;
-    damaged(place() + std::to_string(lost) + " lines are missing before it", lost);
+    damaged(place() + std::to_string(lost) + " lines are missing before it", lost - std::min(lost, std::exchange(state_.unplaced, 0)));
   }
   state_.line_number = line.number;
   try {
@@ -376,7 +385,7 @@ bool RecordingReader::read_next() {
     read_line(line.text);
     on_line_(line, true);
   } catch (const Damage &damage) {
-    damaged(place() + damage.text(), 1);
+    damaged(place() + damage.text(), 1, line.text.rfind('#', 0) == 0);
     on_line_(line, false);
   }
   return true;
@@ -418,11 +427,11 @@ void RecordingReader::read_line(const std::string &text) {
   }
 }
 
-/* Nothing for one that is not wanted. Throws Damage for one that is not in the file, of a comment only where all are read. */
+/* Nothing for one that is not wanted, or for a person's comment. Throws Damage for a row of one that is not in the file. */
 std::optional<std::uint32_t> RecordingReader::device_of(std::string_view number, bool is_row) const {
   auto device = to_u64(number);
   if (!device || *device >= devices_.size() || std::to_string(*device) != number) {
-    if (all_ || is_row) {
+    if (is_row) {
       throw Damage{"there is no fingertip \"" + std::string(number) + "\""};
     }
     return std::nullopt;
@@ -512,7 +521,9 @@ void RecordingReader::read_comment(const std::string &text) {
     }
     state_.has_end = true;
   } else {
-    read_info_field(info, key, value);
+    wire_info changed = info;
+    read_info_field(changed, key, value);
+    info = changed; /* not where it is damaged */
   }
 }
 
@@ -616,15 +627,14 @@ void RecordingReader::read_info_field(wire_info &info, const std::string &key, c
 }
 
 void RecordingReader::choose_device(const std::string &serials) {
-  const auto all = split(trim(serials), ' ');
-  devices_.assign(all.begin(), all.end());
-  state_.infos.assign(all.size(), wire_info{});
-  state_.has_info.assign(all.size(), false);
+  devices_ = serials_in(serials);
+  state_.infos.assign(devices_.size(), wire_info{});
+  state_.has_info.assign(devices_.size(), false);
   if (all_) {
     return;
   }
-  for (std::size_t i = 0; i < all.size(); i++) {
-    if (wanted_.empty() ? all.size() == 1 : is_same_serial(devices_[i], wanted_)) {
+  for (std::size_t i = 0; i < devices_.size(); i++) {
+    if (wanted_.empty() ? devices_.size() == 1 : is_same_serial(devices_[i], wanted_)) {
       number_ = static_cast<std::uint32_t>(i);
       return;
     }
@@ -657,9 +667,7 @@ std::vector<std::string> fingertips_in(const std::string &path) {
   try {
     RecordingReader reader(path, true, open_lines(path));
     reader.next();
-    auto serials = reader.devices_;
-    serials.erase(std::remove(serials.begin(), serials.end(), ""), serials.end());
-    return serials;
+    return reader.devices_;
   } catch (const Error &) {
     return {}; /* the reader will report it */
   }

@@ -52,6 +52,8 @@ public:
   /* The position of reading, to go back to. */
   struct State {
     std::uint64_t line_number = 0, skipped_lines = 0;
+    std::uint64_t unplaced = 0;       /* of them, each for a part of the file that shows no number of a line */
+    std::vector<std::string> damages; /* the first ones */
     bool header_seen = false, has_end = false;
     std::vector<wire_info> infos{wire_info{}}; /* of each fingertip */
     std::vector<bool> has_info{false};         /* whether it was given */
@@ -65,6 +67,8 @@ public:
   void go_to(const Place &place);
 
   std::uint64_t skipped_lines() const { return state_.skipped_lines; }
+  /* What was wrong where any were skipped, with file and place: the first ones. */
+  const std::vector<std::string> &damages() const { return state_.damages; }
   /* Whether the end line was seen: without one the recording was cut short. */
   bool has_end() const { return state_.has_end; }
   /* This fingertip's counts by its recorder, once the end was read. */

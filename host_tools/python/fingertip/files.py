@@ -33,7 +33,7 @@ from .errors import InputError
 from .frames import Edge, frame_of
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
 from .mcap_recording import MAGIC, Contacts, Damaged, Line, LogClock, McapLineReader, Skipped
-from .recorded import JOINT_COLUMNS, OF_SPREADSHEETS, UNKNOWN_HEADER, Rows, counts_of, judge_key, packet_of, restored
+from .recorded import JOINT_COLUMNS, OF_SPREADSHEETS, UNKNOWN_HEADER, Rows, counts_of, judge_key, packet_of, restored, serials_of
 
 if TYPE_CHECKING:
     import pandas
@@ -409,7 +409,7 @@ def recorded_devices(path: Path) -> list[str]:
         return []
     for each in lines:
         if not isinstance(each, Damaged) and each[1].startswith("# devices:"):
-            return each[1].split(":", 1)[1].split()
+            return serials_of(each[1].split(":", 1)[1])
     raise InputError(f'{path}: no line "# devices: ..."; record again')
 
 
@@ -430,8 +430,7 @@ class _Reading:
         self, path: Path, is_joint: bool, serial: str | None, columns: Collection[str] | None, interval_s: tuple[float, float] | None
     ) -> None:
         self.interval_s = interval_s
-        self.clock = LogClock({})
-        self.is_over = False
+        self.clock, self.is_over = LogClock({}), False
         self.path, self.is_joint, self.serial, self.chosen = path, is_joint, serial, columns
         self.number: int | None = None  # of the wanted fingertip among several
         self.rows: Rows | None = None  # once there is a header
@@ -554,8 +553,8 @@ class _Reading:
         elif self.is_joint and key == "packet":
             raise ValueError("a packet without a fingertip's number")
         elif self.is_joint and key == "devices":
-            self.number, self.has_info, self.info_sensors = _choose_device(self.path, value.split(), self.serial), False, 0
-            self.devices = len(value.split())
+            serials, self.has_info, self.info_sensors = serials_of(value), False, 0
+            self.number, self.devices = _choose_device(self.path, serials, self.serial), len(serials)
         if key == "end":
             counts = dict(pair.split("=", 1) for pair in value.split(" ") if "=" in pair) if self.is_joint else counts_of(value)
             self.end = {**counts, **self.own_end}
@@ -599,19 +598,20 @@ def read_recording(
     np.empty(30_000_000, np.uint8)  # freed at once: glibc gives the memory of smaller arrays back no longer, only to ask for it again
     lines = _RecordingLines(path, progress, interval_s)
     reading = _Reading(path, lines.format == "2", serial, columns, interval_s)
-    skipped = 0
+    skipped = unplaced = skipped_to = 0
     last: int | None = None  # line's number
-    skipped_to = 0
 
-    def damaged(error: InputError, lost: int) -> None:
-        nonlocal skipped
-        if not salvage or reading.rows is None:
+    def damaged(error: InputError, lost: int, is_comment: bool = False) -> None:
+        nonlocal skipped, unplaced
+        if not salvage or (reading.rows is None and not is_comment):
             raise error
         skipped += lost
+        unplaced += isinstance(error, Damaged)  # the next line's number may show that more are lost
 
-    def wrong(number: int, error: ValueError) -> None:
+    def wrong(number: int, error: ValueError, is_comment: bool = False) -> None:
         what = str(error) if len(str(error)) <= 200 else f"{str(error)[:200]}..."
-        damaged(InputError(f"{path}:{number}: {what}" + ("; use --salvage to skip damaged lines" if reading.rows else "")), 1)
+        what += "; use --salvage to skip damaged lines" if reading.rows or is_comment else ""
+        damaged(InputError(f"{path}:{number}: {what}"), 1, is_comment)
 
     def one(number: int, text: str, torn: bool) -> None:
         if text.startswith("#") or len(reading.waits) >= ROWS_AT_ONCE:
@@ -622,15 +622,15 @@ def read_recording(
             reading.line(number, text)
         except ValueError as error:
             reading.take_rows(wrong)
-            wrong(number, error)
+            wrong(number, error, text.startswith("#"))
 
     def follow(number: int, to: int) -> None:
-        nonlocal last
+        nonlocal last, unplaced
         if last is not None and number > max(last + 1, skipped_to):
             reading.take_rows(wrong)
-            damaged(
-                InputError(f"{path}:{number}: {number - last - 1} lines are missing before it; use --salvage to go on"), number - last - 1
-            )
+            lost = number - last - 1
+            damaged(InputError(f"{path}:{number}: {lost} lines are missing before it; use --salvage to go on"), max(0, lost - unplaced))
+            unplaced = 0
         last = to
 
     for each in lines.stretches():
@@ -642,12 +642,12 @@ def read_recording(
             skipped_to = each.to
             continue
         if isinstance(each, Damaged):
-            damaged(each, 0)  # the next one's number shows how many lines are lost
+            damaged(each, 1)
         elif isinstance(each, Contacts):
             assert reading.rows is not None
             for found in lines.mcap.tables(each, reading.rows, reading.devices):
                 if isinstance(found, Damaged):
-                    damaged(found, 0)
+                    damaged(found, 1)
                 else:
                     follow(found[0][0], found[0][-1])
                     reading.take_contacts(*found)

@@ -27,7 +27,7 @@ from .line import CONTACT_COLUMNS, LATER_COLUMNS, MAPS, RAW_COLUMNS, SENSORS_MAX
 from .lines import LineFile, shortest
 from .messages import CONTACT_TYPE, DIAGNOSTICS_TYPE, FRAME_TOPICS, LINE_TYPE, PRESSURES_TYPE, TYPES, FrameMessages
 from .messages import diagnostics, health_status, name_in_ros, stamp
-from .recorded import Rows, header_text
+from .recorded import Rows, header_text, serials_of
 from .ros_messages import CDR_LITTLE_ENDIAN, PRIMITIVES, decode, encode, fields_of, schema_of
 
 LATEST_ns = (2**31 - 1) * 10**9  # that a ROS message can hold
@@ -176,7 +176,7 @@ class McapLines:
         pairs = [text[1:].strip().partition(": ")[::2] for text in head if text.startswith("#") and ": " in text]
         keys = dict(pairs)
         self._joint = head[:1] == ["# fingertip-recording 2"]
-        serials = keys.get("devices", "").split() if self._joint else [keys.get("serial", "")]
+        serials = serials_of(keys.get("devices", "")) if self._joint else [keys.get("serial", "")]
         self._devices = [_Device(number, serial) for number, serial in enumerate(serials)]
         for key, value in pairs:
             device, own = self._device_of(key)
@@ -517,18 +517,19 @@ class McapLineReader:
                 topic, name = channel
                 if name in (CONTACT_TYPE, LINE_TYPE):
                     message = data[begin + 22 : end]
-                    message = self._unzstd(message, MESSAGE_MOST_bytes) if message[:4] == _ZSTD else message  # packed by itself
+                    if message[:4] == _ZSTD:  # packed by itself
+                        try:
+                            message = self._unzstd(message, MESSAGE_MOST_bytes)
+                        except self._mcap.stream_reader.zstandard.ZstdError:
+                            message = b""
+                        message = message if len(message) <= MESSAGE_MOST_bytes else b""
                     wanted.append((name, topic, message, unpack("<Q", data, begin + 6)[0]))
                 elif name == PRESSURES_TYPE:
                     clouds.setdefault(topic, data[begin + 22 : end])
             elif kind in (_SCHEMA, _CHANNEL):
                 self._declare(kind, data[begin:end])
         found: list[Line | Contacts | Damaged] = []
-        contact = next((each for each in wanted if each[0] == CONTACT_TYPE), None)
-        if self._topic is None and contact and all(name != LINE_TYPE for _, name in channels.values()):
-            self._topic = contact[1]
-            found += self._made_head(contact[2], clouds.get(contact[1].rpartition("/")[0] + "/pressures", b""))
-            self._count = len(found)
+        has_lines = any(name == LINE_TYPE for _, name in channels.values())
         self._has_any = self._has_any or bool(wanted)
         if self._begin_ns is None and wanted:
             self._begin_ns = min(time_ns for name, _, _, time_ns in wanted if name == wanted[0][0])
@@ -536,6 +537,10 @@ class McapLineReader:
         rows: list[bytes] = []
         times_s: list[float] = []
         for name, topic, message, time_ns in wanted:
+            if name == CONTACT_TYPE and self._topic is None and not has_lines and message:
+                self._topic = topic
+                found += self._made_head(message, clouds.get(topic.rpartition("/")[0] + "/pressures", b""))
+                self._count = len(found)
             if self._topic and name == CONTACT_TYPE and time_ns < self._latest_ns:
                 raise InputError(f"{self.path}: messages in another order than that of time: mcap sort FILE -o OUT")
             self._latest_ns = time_ns

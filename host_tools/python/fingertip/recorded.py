@@ -64,13 +64,14 @@ def restored(lines: Iterable[str]) -> Iterator[str]:
     up with empty cells. An empty one follows a last line that is whole."""
     fill, separator, commas, is_whole = "", ",", -1, False
     for number, text in enumerate(line.rstrip("\r") for line in lines):
-        is_quoted = text.startswith('"#')
-        kept = text.rstrip(',;\t"' if is_quoted else ",;\t")
-        fill, is_whole = text[len(kept) :] if number == 0 else fill, False
-        if is_quoted or text.startswith("#"):
-            is_whole = bool(fill) and text[len(kept) :] == fill
-            if is_quoted:
-                text = kept[1:].replace('""', '"')
+        quoted = re.match('"(#(?:[^"]|"")*)"?', text)
+        rest = text[quoted.end() :] if quoted else text
+        kept = rest.rstrip(',;\t"' if quoted else ",;\t")
+        fill, is_whole = rest[len(kept) :] if number == 0 else fill, False
+        if quoted or text.startswith("#"):
+            is_whole = (text.count('"') % 2 == 0 if quoted else bool(fill)) and rest[len(kept) :] == fill
+            if quoted:
+                text = quoted[1].replace('""', '"') + kept
             else:
                 text = kept if fill else text
                 text = _plain(text, separator) if separator != "," and separator in text else text  # cells, as a grasp's
@@ -135,6 +136,11 @@ def judge_key(key: str, value: str) -> None:
             number(key, value, _BINARY32)
         else:
             whole(key, value, _SCALARS[key])
+
+
+def serials_of(text: str) -> list[str]:
+    """Of a joint recording's fingertips, "A B"; people write "A, B"."""
+    return text.replace(",", " ").split()
 
 
 def counts_of(text: str) -> dict[str, str]:

@@ -36,9 +36,9 @@ export async function start(module, unpack = null) {
         try {
           const bytes = unpack(new Uint8Array(exports.memory.buffer, at, length), size);
           new Uint8Array(exports.memory.buffer, to, size).set(bytes);
-          return bytes.length === size ? 1 : 0;
+          return bytes.length;
         } catch {
-          return 0;
+          return -1;
         }
       },
     },

@@ -62,6 +62,27 @@ class TestMcap(unittest.TestCase):
         self.assertIn(f"edited.csv:{row + 1}: t_us is", self.refused("convert", path, bag, "--overwrite"))
         for kept in ("x.mcap", "x.csv"):  # as a note, so that what is converted is read
             self.assertIn(b"\n# unread: x" + lines[row], self.convert(self.convert(path, kept, "--salvage"), "y.csv").read_bytes())
+        path.write_bytes(b"\n".join([lines[0], b"# rate_mHz: abc", *lines[1:]]))
+        self.assertIn('edited.csv:2: rate_mHz is "abc"; use --salvage', self.refused("convert", path, bag, "--overwrite"))
+        self.assertIn(b"\n# unread: # rate_mHz: abc\n", self.convert(path, "x.csv", "--salvage").read_bytes())
+        data = bytearray(self.bag.read_bytes())
+        with open(self.bag, "rb") as file:
+            chunk = make_reader(file).get_summary().chunk_indexes[1]
+        data[chunk.chunk_start_offset + chunk.chunk_length - 9] ^= 1
+        bag.write_bytes(data)
+        said = bags.call(FINGERTIP, "convert", bag, path, "--salvage", "--overwrite").stderr
+        self.assertRegex(said, r"edited.mcap: byte \d+: a chunk .*\n(.*\n)*.*edited.mcap: \d+ damaged lines skipped\n")
+
+    def test_a_quoted_note_keeps_its_end(self):
+        path = self.folder / "quoted.csv"
+        for note, cell in (
+            ('# event: "a"', '"# event: ""a"""'),
+            ("# event: b,", '"# event: b,",,,'),
+            ("# event: c;", '"# event: c;","",""'),
+        ):
+            path.write_bytes(self.several_csv.read_bytes().replace(b"\n# end", f"\n{cell}\n# end".encode()))
+            self.assertIn(f"\n{note}\n", self.convert(path, "plain.csv").read_text(encoding="utf-8"))
+            self.assertEqual(read_recording(path, serial="AAAA").events, [note.removeprefix("# event: ")])
 
     def test_tool_and_package_write_the_same_of_several(self):
         bags.of_python(self.several_csv, self.folder / "same.mcap")
@@ -82,9 +103,10 @@ class TestMcap(unittest.TestCase):
             path.write_bytes(data)
             try:
                 there = read_recording(path, salvage=True, serial="AAAA")
-                bag = self.convert(path, "edited.mcap", "--salvage")
-            except InputError:  # its head is damaged, or it is no UTF-8
+                data.decode("utf-8")
+            except (InputError, UnicodeDecodeError):  # its head is damaged
                 continue
+            bag = self.convert(path, "edited.mcap", "--salvage")
             here = read_recording(self.convert(bag, "edited_back.csv"), serial="AAAA")
             self.assertEqual(repr((dict(there.columns), there.sensors_Pa)), repr((dict(here.columns), here.sensors_Pa)), number)
         path.write_bytes(text + b"# note: \xff\n")

@@ -61,18 +61,6 @@ private:
   ProgressBar bar_;
 };
 
-/* That a recording has a place for. */
-bool is_kept(const wire_packet &packet) {
-  return is_frame(packet) || packet.type == WIRE_HEALTH || packet.type == WIRE_INFO || packet.type == WIRE_ACK || packet.type == WIRE_SYNC;
-}
-
-void check_paths(const Conversion &conversion) {
-  if (is_same_file(conversion.from, conversion.to)) {
-    throw Error(conversion.to + ": is the file to read; give another name");
-  }
-  check_output(conversion.to, conversion.overwrite);
-}
-
 Error no_frames(const std::string &path, const TimeSpan &interval) {
   return Error(path + (interval.is_all() ? ": no frames in it; give a recording or capture of a streaming fingertip"
                                          : ": no frames from --from to --to; give a part that has some"));
@@ -101,7 +89,8 @@ Contents contents_of(const Conversion &conversion) {
     }
     const wire_packet &packet = item->packet;
     contents.frames += is_frame(packet);
-    contents.left_out += !is_kept(packet);
+    constexpr std::uint8_t KEPT[] = {WIRE_CONTACT, WIRE_RAW, WIRE_HEALTH, WIRE_INFO, WIRE_ACK, WIRE_SYNC};
+    contents.left_out += std::find(std::begin(KEPT), std::end(KEPT), packet.type) == std::end(KEPT);
     if (packet.type == WIRE_INFO && !contents.info) {
       contents.info = packet.body.info;
     } else if (packet.type == WIRE_RAW && !contents.sensor_count) {
@@ -116,9 +105,12 @@ Contents contents_of(const Conversion &conversion) {
 }
 
 /* On standard error: damaged lines, a missing end. */
-void report_losses(const std::string &path, Count skipped_lines, bool is_cut_short) {
-  if (skipped_lines > 0) {
-    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", printable(path).c_str(), skipped_lines);
+void report_losses(const std::string &path, const RecordingReader *reader, bool is_cut_short) {
+  for (std::size_t i = 0; reader && i < reader->damages().size(); i++) {
+    std::fprintf(stderr, "%s\n", printable(reader->damages()[i]).c_str());
+  }
+  if (reader && reader->skipped_lines() > 0) {
+    std::fprintf(stderr, "%s: %llu damaged lines skipped\n", printable(path).c_str(), static_cast<Count>(reader->skipped_lines()));
   }
   if (is_cut_short) {
     std::fprintf(stderr, "%s: no end line: the recording was cut short, its recorder killed or its disk full\n", printable(path).c_str());
@@ -157,7 +149,7 @@ void convert_packets(const Conversion &conversion) {
     }
   }
   writer.finish({file.statistics()}, "converted");
-  report_losses(conversion.from, file.skipped_lines(), file.is_cut_short());
+  report_losses(conversion.from, file.recording(), file.is_cut_short());
   if (contents.left_out > 0) {
     std::fprintf(stderr, "%s: %llu packets are of kinds that recordings leave out\n", printable(conversion.from).c_str(),
                  static_cast<Count>(contents.left_out));
@@ -185,7 +177,7 @@ void convert_lines(const Conversion &conversion) {
     throw no_frames(conversion.from, conversion.interval);
   }
   sink->finish();
-  report_losses(conversion.from, reader.skipped_lines(), !reader.has_end());
+  report_losses(conversion.from, &reader, !reader.has_end());
   std::printf("%s: %llu lines\n", printable(conversion.to).c_str(), static_cast<Count>(count));
 }
 
@@ -203,7 +195,7 @@ void convert_to_capture(const Conversion &conversion) {
     }
   }
   capture.finish();
-  report_losses(conversion.from, file.skipped_lines(), file.is_cut_short());
+  report_losses(conversion.from, file.recording(), file.is_cut_short());
   std::printf("%s: %llu packets, without the recorder's own lines\n", printable(conversion.to).c_str(), static_cast<Count>(packets));
 }
 
@@ -216,7 +208,10 @@ int convert(const Conversion &conversion) {
   if (conversion.every_row && !is_mcap_name(conversion.to)) {
     throw WrongUsage("--every-row is for MCAP files; leave it out, or let OUT end with .mcap");
   }
-  check_paths(conversion);
+  if (is_same_file(conversion.from, conversion.to)) {
+    throw Error(conversion.to + ": is the file to read; give another name");
+  }
+  check_output(conversion.to, conversion.overwrite);
   if (to_capture) {
     convert_to_capture(conversion);
   } else if (conversion.device.empty() && is_recording(conversion.from, *open_bytes(conversion.from))) {
@@ -283,7 +278,7 @@ int show(const ReplayOptions &options) {
     if (model.frames() == 0 && track.is_ended()) {
       throw no_frames(options.file, options.interval);
     }
-    report_losses(options.file, track.file().skipped_lines(), track.file().is_cut_short());
+    report_losses(options.file, track.file().recording(), track.file().is_cut_short());
     bool several = playback.tracks().size() > 1;
     std::printf("%s: %s%s\n", name.c_str(), several && model.info() ? (text_field(model.info()->serial) + ": ").c_str() : "",
                 summary_text(model).c_str());
