@@ -15,6 +15,7 @@ extern "C" {
 namespace fingertip::calibrating {
 
 constexpr double Q10 = 1024.0;
+constexpr double PITCHES_MOST = 128.0; /* of a sensor from the pad's middle */
 
 static std::string percent(double share) { return fixed(100.0 * share, 1) + " %"; }
 
@@ -42,14 +43,17 @@ Array array_of(const wire_info &info) {
     array.y_mm.push_back(static_cast<double>(info.y_mm[k]));
   }
   array.pitch_mm = static_cast<double>(info.pitch_mm);
-  if (array.pitch_mm > 0.0) {
-    return array;
+  if (!(array.pitch_mm > 0.0)) { /* a free layout: the distance of the nearest two */
+    array.pitch_mm = std::numeric_limits<double>::infinity();
+    for (std::size_t a = 0; a < array.sensors(); a++) {
+      for (std::size_t b = 0; b < a; b++) {
+        array.pitch_mm = std::min(array.pitch_mm, std::hypot(array.x_mm[a] - array.x_mm[b], array.y_mm[a] - array.y_mm[b]));
+      }
+    }
   }
-  /* A free layout: the distance of the nearest two. */
-  array.pitch_mm = std::numeric_limits<double>::infinity();
-  for (std::size_t a = 0; a < array.sensors(); a++) {
-    for (std::size_t b = 0; b < a; b++) {
-      array.pitch_mm = std::min(array.pitch_mm, std::hypot(array.x_mm[a] - array.x_mm[b], array.y_mm[a] - array.y_mm[b]));
+  for (std::size_t k = 0; k < array.sensors(); k++) { /* places between them are tried */
+    if (!std::isfinite(array.pitch_mm) || !(std::hypot(array.x_mm[k], array.y_mm[k]) / array.pitch_mm <= PITCHES_MOST)) {
+      throw Error("the sensors' places, x_mm, y_mm and pitch_mm, are none of a pad; build the firmware of this pad again");
     }
   }
   return array;

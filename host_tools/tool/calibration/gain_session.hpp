@@ -13,7 +13,7 @@
 
 namespace fingertip::calibrating {
 
-/* Its sensors; the pitch of a free layout is the distance of the nearest two. */
+/* Its sensors; the pitch of a free layout is the distance of the nearest two. Throws Error where they lie nowhere, or far apart. */
 Array array_of(const wire_info &info);
 /* The frame of a raw packet. */
 Frame frame_of(const wire_packet &packet);

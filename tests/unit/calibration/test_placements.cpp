@@ -1,6 +1,9 @@
+#include "libfingertip/error.hpp"
 #include "support/placements.hpp"
+#include "tool/calibration/gain_session.hpp"
 #include "tool/calibration/placements.hpp"
 
+#include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
 
@@ -232,5 +235,15 @@ TEST(Placements, follow_one_another_in_time_over_a_restart) {
   for (std::size_t i = 1; i < 3; i++) {
     EXPECT_NEAR(feed.found[i].t_s - feed.found[i - 1].t_s, 4.6, 0.8);
     EXPECT_LT(feed.error(feed.found[i]), 0.003);
+  }
+}
+
+TEST(Placements, need_sensors_that_lie_on_a_pad) {
+  for (const auto &[pitch_mm, x_mm] : {std::pair{9.0F, 1e30F}, {1e-20F, 9.0F}, {0.0F, 0.0F}, {9.0F, NAN}, {INFINITY, 9.0F}}) {
+    wire_info info{};
+    info.sensor_count = 2;
+    info.pitch_mm = pitch_mm;
+    info.x_mm[1] = x_mm;
+    EXPECT_THROW(array_of(info), fingertip::Error) << pitch_mm << " " << x_mm;
   }
 }
