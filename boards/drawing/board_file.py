@@ -40,8 +40,8 @@ def footprint(part, numbers):
     yield from (f'    (fp_rect {corners} (layer "{each}.CrtYd") (width 0.05) (fill none))' for each in (side if land.pads else "FB"))
     if len(land.pads) > 2:
         _, x, y, w, _ = land.pads[0]
-        dot = f"(center {number(x - w / 2 - 0.35)} {number(flip * y)}) (end {number(x - w / 2 - 0.25)} {number(flip * y)})"
-        yield f'    (fp_circle {dot} (layer "{side}.SilkS") (width 0.15) (fill none))'
+        dot = f"(center {number(x - w / 2 - 0.45)} {number(flip * y)}) (end {number(x - w / 2 - 0.3)} {number(flip * y)})"
+        yield f'    (fp_circle {dot} (layer "{side}.SilkS") (width 0.3) (fill none))'
     for name, x, y, w, h in land.pads:
         net = f' (net {numbers[part.nets[name]]} "{part.nets[name]}")' if name in part.nets else ""
         place = f"(at {number(x)} {number(flip * y)}{turn}) (size {number(w)} {number(h)})"
