@@ -3,18 +3,33 @@
 #include "condition/update.h"
 #include "port/divide.h"
 
+#include <stddef.h>
 #include <string.h>
 
 /* warm: bitmap of the sensors that were calm just now. */
 static void begin(struct condition *condition, sensor_map warm) {
-  memset(condition, 0, sizeof *condition);
+  const uint32_t now_ms = condition->now_ms;
+  memset(condition, 0, offsetof(struct condition, sensor));
+  condition->now_ms = now_ms;
   condition->gate.released_ms = AGE_MAX_ms;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++, warm >>= 1) {
     update_begin_tare(condition, k, warm & 1u ? Pa_q10(ZERO_WARM_Pa) : Pa_q10(ZERO_COLD_Pa));
   }
 }
 
-void condition_start(struct condition *condition) { begin(condition, 0); }
+void condition_start(struct condition *condition) {
+  memset(condition, 0, sizeof *condition);
+  begin(condition, 0);
+}
+
+void condition_resume(struct condition *condition, uint32_t asleep_ms) {
+  struct gate *gate = &condition->gate;
+  if (!gate->pressed || condition->unsure) {
+    begin(condition, 0);
+  } else {
+    gate->pressed_ms = asleep_ms < AGE_MAX_ms - gate->pressed_ms ? gate->pressed_ms + asleep_ms : AGE_MAX_ms;
+  }
+}
 
 void condition_tare(struct condition *condition) {
   sensor_map warm = ~condition->taring;
@@ -96,7 +111,7 @@ static int32_t scaled_by(int32_t value, uint32_t inverse_q16) {
   return (value >> 16) * (int32_t)inverse_q16 + (int32_t)(low * (inverse_q16 >> 16)) + (int32_t)(low * (inverse_q16 & 0xFFFF) >> 16);
 }
 
-/* Fills in pressures and peak; the strongest sensor is the answer. */
+/* Fills in pressures, peak and lowest. Returns the index of the strongest sensor. */
 static uint8_t read_sensors(const struct condition *condition, const struct frame *frame, const struct condition_gains *gains,
                             struct conditioned *conditioned) {
   int32_t peak = 0, lowest = 0;
@@ -205,9 +220,9 @@ static void begin_frame(struct condition *condition, const struct frame *frame) 
 
 /* The strongest decides, except where its own margin is larger than that of others. */
 static bool is_over(const struct condition *condition, const struct frame *frame, const struct conditioned *conditioned, uint8_t strongest,
-                    int32_t limit) {
+                    int32_t limit, bool saturated) {
   const int32_t *margin = condition->margin_Pa_q10;
-  if (frame->saturated != 0 || conditioned->peak_Pa_q10 > limit + margin[strongest]) {
+  if (saturated || conditioned->peak_Pa_q10 > limit + margin[strongest]) {
     return true;
   }
   bool over = false;
@@ -218,9 +233,10 @@ static bool is_over(const struct condition *condition, const struct frame *frame
 }
 
 /* Returns whether a contact begins or ends with this frame. */
-static bool move_gate(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned, uint8_t strongest) {
+static bool move_gate(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned, uint8_t strongest,
+                      bool saturated) {
   struct gate *gate = &condition->gate;
-  const bool over = is_over(condition, frame, conditioned, strongest, gate->pressed ? gate->close_Pa_q10 : gate->open_Pa_q10);
+  const bool over = is_over(condition, frame, conditioned, strongest, gate->pressed ? gate->close_Pa_q10 : gate->open_Pa_q10, saturated);
   if (over == gate->pressed) {
     return false;
   }
@@ -253,7 +269,6 @@ static bool is_doubtful(struct condition *condition, const struct conditioned *c
 void condition_frame(struct condition *condition, const struct frame *frame, const struct condition_gains *gains,
                      struct conditioned *conditioned) {
   const uint8_t count = frame->sensor_count;
-  const bool saturated = frame->saturated != 0;
   begin_frame(condition, frame);
 
   const sensor_map readable = frame->valid & ~frame->saturated;
@@ -262,10 +277,12 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
     conditioned->usable = tare_sensors(condition, frame, readable);
   }
   const uint8_t strongest = read_sensors(condition, frame, gains, conditioned);
+  /* Others measure a press beyond the range of a sensor too. If none does it is the sensor, which touches nothing. */
+  const bool saturated = frame->saturated != 0 && (readable == 0 || conditioned->peak_Pa_q10 > Pa_q10(SATURATED_Pa) >> BESIDE_SHIFT);
 
   /* A contact is judged with the whole remainder, since it leaves one too; its pressures are without what has faded. */
   const int32_t peak = (int32_t)((uint32_t)conditioned->peak_Pa_q10 - (uint32_t)condition->faded_Pa_q10[strongest]);
-  const bool changes = move_gate(condition, frame, conditioned, strongest);
+  const bool changes = move_gate(condition, frame, conditioned, strongest, saturated);
   const bool pressed = condition->gate.pressed;
   if (changes && pressed) {
     begin_contact(condition, conditioned, count);

@@ -15,7 +15,8 @@
  * - Followed: then the level moves at 0.5 Pa/s. A force that rises faster is no drift. In a contact it does not move,
  * except for the drift of the calm before it (calm.h), for an hour.
  * - Taken again: a reading below what a release explains means that the level was taken under a press. The sensor is
- * tared again after ZERO_BELOW_s, or after half a second if it is far below.
+ * tared again after ZERO_BELOW_s, or after half a second if it is far below. Rubber that bulged beside that press may be above its zero
+ * then, and looks like a contact: where a sensor is below by more than eight times what any is above, all are tared again.
  *
  * Remainder: what rubber keeps of a press, which cannot be distinguished from a remaining force.
  * - Each sensor remembers its strongest press; the memory fades in 20 s. Three quarters of the pad's strongest
@@ -78,8 +79,8 @@ struct condition_sensor {
   int32_t past_Pa_q10;    /* what rubber may keep: rises in a hold, and by all that is let go; fades in 3 s */
   int32_t past_share;     /* sd of that, 1 / 2^16: learnt from what is left after contacts */
   int32_t keeps_share;    /* mean, of either sign, learnt as that is */
-  int32_t let_go_Pa_q10;  /* suddenly in this contact, fading: as where it slides on */
-  int32_t kept_Pa_q10;    /* of that */
+  int32_t let_go_Pa_q10;  /* sum of sudden falls in this contact, as where it slides on; fades in 3 s */
+  int32_t kept_Pa_q10;    /* let_go times keeps_share, which faded_Pa_q10 is less by */
   int32_t wander_Pa_q10;
   int32_t taken_Pa_q10;
   int32_t crept_Pa_q10;   /* risen slowly */
@@ -138,7 +139,7 @@ struct condition_gains {
 
 struct conditioned {
   sensor_map usable;                       /* bitmap: tared, valid and not saturated */
-  bool tared;                              /* every valid sensor is, there is one, and none is far below */
+  bool tared;                              /* every valid sensor is, there is one, and none is below what a release explains */
   bool contact;                            /* the gate */
   bool zero_doubtful;                      /* a force and a zero that has moved look alike */
   int32_t peak_Pa_q10;                     /* strongest usable reading; 0 when none */
@@ -150,7 +151,10 @@ struct conditioned {
 /* Begins with sensors that were off, and asks for a tare of all. */
 void condition_start(struct condition *condition);
 
-/* Asks for a tare of all sensors over the next frames. A sensor whose zero had settled is warm. */
+/* After asleep_ms without a frame: begins again, except in a contact that is sure, whose zeros stay and may have drifted. */
+void condition_resume(struct condition *condition, uint32_t asleep_ms);
+
+/* Asks for a tare of all sensors over the next frames. A sensor whose zero had settled is warm. How much its rubber keeps stays known. */
 void condition_tare(struct condition *condition);
 
 /* Processes one frame, later than the one before by frame->t_us. Do not pass held frames. gains: NULL for sensors that

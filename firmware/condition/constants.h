@@ -5,8 +5,8 @@
 #include "condition/fixed.h"
 
 /* Time. */
-#define UPDATE_ms 64                          /* between two updates of a sensor; choice, a twentieth of its time constants */
-#define STEP_MAX_ms 16383                     /* a longer gap counts as this; range of the products */
+#define UPDATE_ms 64      /* between two updates of a sensor; choice, a seventh and less of its time constants, but for REMAINDER_DOWN_ms */
+#define STEP_MAX_ms 16383 /* a longer gap counts as this; range of the products */
 #define AGE_MAX_ms ((uint32_t)SECONDS(86400)) /* an age stops there; range */
 #define SLOW_ms SECONDS(1)                    /* low pass of the readings; choice */
 
@@ -49,10 +49,12 @@
 #define BELOW_ms SECONDS(ZERO_BELOW_s) /* the same */
 #define FAR_BELOW_Pa 1000              /* farther below no wait is needed; choice */
 #define FAR_BELOW_ms MS(500)           /* but this; choice */
+#define BULGE_SHIFT 3                  /* an eighth of a press: what is less may be rubber that bulged beside it; defaults.h: 1.5 % */
 
 /* What rubber keeps of a press (strips: 0.4 to 13 % above, 1 to 15 % below, for 0.5 to 20 s). */
 #define MEMORY_ms SECONDS(20)             /* time constant of the memory */
 #define SATURATED_Pa 100000               /* counts for a press beyond the range of a sensor */
+#define BESIDE_SHIFT 7                    /* 0.8 kPa: what the sensor beside it measures at least, at a width of a third of the pitch */
 #define BAND_SHIFT 3                      /* an eighth of the memory may remain; ZERO.md: a sixteenth and a quarter fail */
 #define DIP_SHIFT 2                       /* a quarter may be missing */
 #define REOPEN_SHIFT 4                    /* a sixteenth: what a sudden press must exceed after FRESH_ms */

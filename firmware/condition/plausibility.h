@@ -21,11 +21,9 @@ struct plausibility {
 
 bool plausibility_compare(struct plausibility *plausibility, const struct frame *frame, const struct conditioned *conditioned);
 
-/* Call with each frame that is not held. Returns whether .apart may have changed: not while readings are unsettled. A sensor beyond its
- * range counts as a contact; if no other measures it, it is the sensor. Cost: 10 Cortex-M0+ cycles in a contact, else as of apart_find(),
- * once in two seconds. */
+/* Call with each frame that is not held. Returns whether .apart may have changed: not while readings are unsettled. Cost: 10 Cortex-M0+
+ * cycles in a contact, else as of apart_find(), once in two seconds. */
 static inline bool plausibility_follow(struct plausibility *plausibility, const struct frame *frame,
                                        const struct conditioned *conditioned) {
-  const bool touched = conditioned->contact && (frame->saturated == 0 || conditioned->peak_Pa_q10 >= GATE_OPEN_Pa * 1024);
-  return !touched && !frame->unsettled && plausibility_compare(plausibility, frame, conditioned);
+  return !conditioned->contact && !frame->unsettled && plausibility_compare(plausibility, frame, conditioned);
 }

@@ -294,8 +294,15 @@ static int32_t follow_level(const struct step *step, const struct band *band, bo
   return crept + kept;
 }
 
+/* The dip that it was may come back, so it counts as taken. */
+static void tare_below(struct condition *condition, uint8_t k, int32_t above_Pa_q10) {
+  struct condition_sensor *sensor = &condition->sensor[k];
+  update_begin_tare(condition, k, larger(sensor->spread_Pa_q10, Pa_q10(ZERO_WARM_Pa)));
+  sensor->wander_Pa_q10 = sensor->taken_Pa_q10 = clamp(above_Pa_q10, -Pa_q10(RETURN_MAX_Pa), 0);
+}
+
 /* A sensor that has been below was tared under a press, and so were all others: those that are far below now are tared with it, at their
- * next update, and those beside them settle. The dip that it was may come back, so it counts as taken. */
+ * next update, and those beside them settle. */
 static void tare_again(struct condition *condition, uint8_t k, bool far, int32_t above_level_Pa_q10) {
   for (uint8_t j = 0; j < FT_MAX_SENSORS; j++) {
     struct condition_sensor *other = &condition->sensor[j];
@@ -304,9 +311,7 @@ static void tare_again(struct condition *condition, uint8_t k, bool far, int32_t
       other->below_ms = BELOW_ms;
     }
   }
-  struct condition_sensor *sensor = &condition->sensor[k];
-  update_begin_tare(condition, k, sensor->spread_Pa_q10);
-  sensor->wander_Pa_q10 = sensor->taken_Pa_q10 = larger(above_level_Pa_q10, -Pa_q10(RETURN_MAX_Pa));
+  tare_below(condition, k, above_level_Pa_q10);
 }
 
 /* lowest_Pa_q10: a reading above the level that is lower is below all that a release explains. */
@@ -345,6 +350,22 @@ static void follow(const struct step *step) {
   condition->margin_Pa_q10[step->k] = (unsure ? 0 : band.margin_Pa_q10) + sensor->spread_Pa_q10;
   set_bit(&condition->restless, step->k, size_of(above_level) > Pa_q10(CALM_LAG_Pa) + step->noise_Pa_q10 / 2);
   watch_below(step, above_level, band.lowest_Pa_q10 - condition->gate.open_Pa_q10);
+}
+
+/* Whether this is no contact: a press under which the zeros were taken is over, and the rubber that bulged beside it is above them. */
+static bool is_release(const struct step *step, int32_t above_Pa_q10, int32_t peak_Pa_q10) {
+  const int32_t under = band_of(step, false).lowest_Pa_q10 - Pa_q10(FAR_BELOW_Pa) - clamp(above_Pa_q10, -PRESSURE_MAX, 0);
+  return step->condition->gate.pressed && peak_Pa_q10 < under >> BULGE_SHIFT;
+}
+
+/* All sensors are tared again after a while. */
+static void release(const struct step *step) {
+  struct condition *condition = step->condition;
+  step->sensor->below_ms = (uint16_t)(step->sensor->below_ms + step->ms);
+  const bool over = step->sensor->below_ms >= FAR_BELOW_ms;
+  for (uint8_t k = 0; over && k < FT_MAX_SENSORS; k++) {
+    tare_below(condition, k, clamped_difference(condition->sensor[k].before_Pa_q10, condition->zero_Pa_q10[k]));
+  }
 }
 
 /* Whether the reading moved since the last update as in a press or a release, and not as a remainder. */
@@ -392,7 +413,9 @@ void update_sensor(struct condition *condition, const struct frame *frame, const
   };
   remember(&step, rise);
   update_compare(condition, k, clamped_difference(conditioned->pressure_Pa_q10[k], condition->faded_Pa_q10[k]));
-  if (condition->gate.pressed && !condition->unsure) {
+  if (is_release(&step, above, conditioned->peak_Pa_q10)) {
+    release(&step);
+  } else if (condition->gate.pressed && !condition->unsure) {
     hold(&step);
   } else {
     step.moves = moves(&step, above);

@@ -64,15 +64,19 @@ TEST(test_unsettled_readings_move_no_zero) {
   TEST_ASSERT_INT32_WITHIN(Pa, AMBIENT + 100 * Pa, condition.zero_Pa_q10[7]);
 }
 
+/* It is a press only where others measure it too: one that is broken must not stop the others. */
 TEST(test_saturated_sensor_means_contact_and_is_left_out) {
   begin_calm(4854);
   frame.saturated = 8;
+  frame.pressure_Pa_q10[3] = INT32_MAX;
+  run_s(10);
+  TEST_ASSERT_FALSE(conditioned.contact || conditioned.zero_doubtful);
+  fill(AMBIENT + 1000 * Pa);
   frame.pressure_Pa_q10[3] = INT32_MAX;
   run(1);
   TEST_ASSERT_TRUE(conditioned.contact);
   TEST_ASSERT_EQUAL_HEX32(ALL & ~8u, conditioned.usable);
   TEST_ASSERT_EQUAL_INT32(0, conditioned.pressure_Pa_q10[3]);
-  TEST_ASSERT_EQUAL_INT32(0, conditioned.peak_Pa_q10);
   run_s(2);
   TEST_ASSERT_INT32_WITHIN(Pa, AMBIENT, condition.zero_Pa_q10[3]);
   /* What remains of it is that of a strong press. */

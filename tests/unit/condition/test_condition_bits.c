@@ -97,8 +97,8 @@ static uint32_t course(void) {
 }
 
 TEST(test_frames_are_conditioned_the_same_to_the_bit) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x7E7A2D05, 0xC91FD7CA, 0xB01CCD32, 0x63987CD7,
-                                                 0x554F72F3, 0x6BD7DE85, 0xA12D4853, 0xF2361F33};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0xA9AB4548, 0xB4EDED8B, 0xC3B5D0FB, 0xA74CC0BE,
+                                                 0x56D42A74, 0x00084507, 0x613E0BA9, 0xA9347955};
   uint32_t found[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x7A65726F));
   for (int i = 0; i < COURSES; i++) {

@@ -307,3 +307,61 @@ TEST(test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew) {
     TEST_ASSERT_EQUAL_INT(late, conditioned.contact);
   }
 }
+
+/* Rubber that bulges beside a press is above its zero once that press, under which it was taken, is over. */
+TEST(test_a_release_of_what_was_tared_is_no_contact) {
+  static const float bulges[] = {0.0f, 0.015f, 0.05f};
+  for (size_t i = 0; i < sizeof bulges / sizeof bulges[0]; i++) {
+    begin(4854);
+    press(30000 * Pa);
+    for (int k = 0; k < SENSORS; k++) {
+      frame.pressure_Pa_q10[k] -= bump(k) < 0.01f ? (int32_t)(bulges[i] * 30000.0f) * Pa : 0;
+    }
+    run_s(10);
+    fill(AMBIENT);
+    run_s(1);
+    TEST_ASSERT_FALSE(conditioned.contact);
+    TEST_ASSERT_TRUE(conditioned.tared);
+    run_s(60);
+    TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+    /* A press that has moved on is one, in doubt: a sensor is far below. */
+    begin(4854);
+    press(30000 * Pa);
+    run_s(10);
+    fill(AMBIENT);
+    frame.pressure_Pa_q10[0] = AMBIENT + 10000 * Pa;
+    run_s(5);
+    TEST_ASSERT_TRUE(conditioned.contact && conditioned.zero_doubtful);
+  }
+}
+
+TEST(test_a_pause_changes_no_zero_in_a_contact) {
+  begin_calm(4854);
+  hold(20000 * Pa, 3);
+  condition_resume(&condition, 3600000);
+  run_s(1);
+  TEST_ASSERT_TRUE(conditioned.contact && conditioned.tared);
+  TEST_ASSERT_INT32_WITHIN(100 * Pa, 20000 * Pa, conditioned.peak_Pa_q10);
+  hold(500 * Pa, 1); /* less than a zero may have drifted meanwhile */
+  TEST_ASSERT_TRUE(!conditioned.contact || conditioned.zero_doubtful);
+  fill(AMBIENT);
+  run_s(10);
+  condition_resume(&condition, 3600000);
+  run(1);
+  TEST_ASSERT_FALSE(conditioned.tared);
+}
+
+/* What is known of the rubber outlives a tare, and a sensor that comes back later waits for the contact's end. */
+TEST(test_a_tare_keeps_what_is_known) {
+  begin_calm(4854);
+  condition.sensor[3].past_share = 8000;
+  frame.valid = ALL & ~(1u << 14);
+  condition_tare(&condition);
+  run_s(2);
+  TEST_ASSERT_EQUAL_INT32(8000, condition.sensor[3].past_share);
+  hold(20000 * Pa, 1);
+  frame.valid = ALL;
+  run_s(1);
+  TEST_ASSERT_EQUAL_HEX32(0, condition.guessed);
+  TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+}

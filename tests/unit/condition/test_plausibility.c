@@ -67,14 +67,6 @@ TEST(test_a_press_changes_nothing) {
   expect_next(3000000, 1u << ODD);
 }
 
-TEST(test_a_sensor_beyond_its_range_that_no_other_feels_is_no_press) {
-  conditioned.contact = true;
-  conditioned.usable = ALL & ~1;
-  frame.saturated = 1;
-  frame.pressure_Pa_q10[ODD] += 5000 * 1024;
-  expect_next(0, 1u << ODD);
-}
-
 TEST(test_comparisons_are_rare_unless_others_are_used) {
   expect_next(0, 0);
   frame.pressure_Pa_q10[ODD] += 5000 * 1024;
