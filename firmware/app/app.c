@@ -17,7 +17,7 @@
 #define SHARED_PITCH_mm 9.0f
 /* Longest time between two rounds of the main loop, us: a fifth of the watchdog's period. */
 #define TICK_us (PORT_WATCHDOG_PERIOD_us / 5u)
-/* The same while something is being stored, which takes some fifty rounds and an erase, and while edges of the sync pin come. */
+/* The same while something is being stored, which takes about a hundred rounds and an erase, and while edges of the sync pin come. */
 #define FAST_TICK_us 1000u
 
 void app_on_event(struct app *app) {
@@ -107,7 +107,7 @@ static void follow_suspend(struct app *app) {
     if (saves) {
       app->saving_since_us = now_us;
     } else if (now_us - app->saving_since_us >= ZERO_LASTS_us) {
-      condition_start(&app->stages.condition.condition);
+      condition_resume(&app->stages.condition.condition, (uint32_t)((now_us - app->saving_since_us) >> 10));
     }
     app->saves_power = saves;
     if (!saves) {
@@ -198,9 +198,8 @@ void app_run(struct app *app) {
   if (news != app->news || tick || app->active) {
     app->news = news;
     port_at(CRASH_AT_COMMANDS);
+    follow_port(app); /* before what the next session asks for */
     app->active = commands_receive(app);
-    /* After the commands: one sent just before the port closed must not outlive it. */
-    follow_port(app);
     set_pace(app);
   }
   port_at(CRASH_AT_READINGS);

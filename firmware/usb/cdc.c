@@ -22,6 +22,7 @@ static struct ring receive_ring = {.bytes = receive_bytes, .size = RECEIVE_BYTES
 static _Atomic uint32_t is_open;
 static _Atomic uint32_t is_suspended;
 static _Atomic uint32_t close_count;
+static _Atomic uint32_t closed_at; /* receive_ring.put when the port was closed last */
 static _Atomic uint32_t loader_requested;
 static _Atomic uint32_t news;
 
@@ -92,6 +93,7 @@ static void update_open(void) {
   bool now_open = port.configured && port.dtr && !cdc_is_suspended();
   if (was_open && !now_open) {
     atomic_store_explicit(&is_open, 0, memory_order_relaxed);
+    atomic_store_explicit(&closed_at, atomic_load_explicit(&receive_ring.put, memory_order_relaxed), memory_order_relaxed);
     uint32_t count = atomic_load_explicit(&close_count, memory_order_relaxed);
     atomic_store_explicit(&close_count, count + 1, memory_order_release);
     add_news();
@@ -216,8 +218,9 @@ enum ft_status cdc_write(const uint8_t *bytes, size_t length) {
 }
 
 size_t cdc_read(uint8_t *bytes, size_t capacity) {
-  uint32_t length = ring_take(&receive_ring, bytes, capacity < RECEIVE_BYTES ? (uint32_t)capacity : RECEIVE_BYTES);
-  if (length)
+  const uint32_t dropped = ring_drop(&receive_ring, atomic_load_explicit(&closed_at, memory_order_acquire));
+  const uint32_t length = ring_take(&receive_ring, bytes, capacity < RECEIVE_BYTES ? (uint32_t)capacity : RECEIVE_BYTES);
+  if (dropped || length)
     usb_controller_request_service();
   return length;
 }

@@ -40,14 +40,12 @@ uint32_t cdc_news(void);
 uint32_t cdc_close_count(void);
 
 /* Queues all of the bytes or none; those of whole words cost less. FT_ERR_SPACE: the queue is too full. FT_ERR_ARGUMENT: longer than the
- * queue will ever hold. Bytes queued while the port is closed are discarded at once. */
+ * queue will ever hold. Bytes queued while the port is closed are discarded at once. The first bytes after an opening, or after queued
+ * bytes were discarded, follow four zero bytes: whatever the host has got of the stream before ends there (PROTOCOL.md). Nothing is sent
+ * before, as a terminal that still echoes would send it back. */
 enum ft_status cdc_write(const uint8_t *bytes, size_t length);
 
-/* The first bytes that are queued after an opening, or after the stream was cut in another way,
- * follow zero bytes, four of them: whatever the host has got of the stream before ends there
- * (PROTOCOL.md). Nothing is sent before, as a terminal that still echoes would send it back. */
-
-/* Takes what has arrived, at most capacity bytes; returns how many. */
+/* Takes what has arrived, at most capacity bytes; returns how many. What had arrived before the port was closed is dropped. */
 size_t cdc_read(uint8_t *bytes, size_t capacity);
 
 /* The host has set 1200 baud and closed the port, or opened it at 1200: it asks for the loader. */

@@ -46,6 +46,15 @@ static inline uint32_t ring_take(struct ring *ring, uint8_t *bytes, uint32_t cap
   return length;
 }
 
+/* Consumer: drops what had been put when .put was this. Returns how many bytes. */
+static inline uint32_t ring_drop(struct ring *ring, uint32_t put) {
+  const uint32_t taken = atomic_load_explicit(&ring->taken, memory_order_relaxed), length = put - taken;
+  if (length > ring->size)
+    return 0; /* they were taken */
+  atomic_store_explicit(&ring->taken, put, memory_order_release);
+  return length;
+}
+
 /* Consumer: drops everything. */
 static inline void ring_clear(struct ring *ring) {
   uint32_t put = atomic_load_explicit(&ring->put, memory_order_acquire);

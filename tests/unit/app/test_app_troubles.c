@@ -34,6 +34,12 @@ TEST(closing_the_port_ends_the_streams) {
   wire_receiver_init(&receiver, wire_all_layouts);
   connect_for(200);
   TEST_ASSERT_FALSE(next_packet(&packet));
+
+  native_cdc_close(); /* and the next host asks before the main loop has seen it */
+  native_cdc_open();
+  start_streams(WIRE_STREAM_CONTACT);
+  run_for(100);
+  TEST_ASSERT_TRUE(next_of_type(WIRE_CONTACT, &packet));
 }
 
 TEST(a_host_that_does_not_read_loses_whole_packets_and_sees_the_gap) {

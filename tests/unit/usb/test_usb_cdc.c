@@ -101,6 +101,17 @@ TEST(test_close_discards_what_waits) {
   TEST_ASSERT_EQUAL(HOST_NAK, host_in(0x82, packet));
 }
 
+TEST(test_close_drops_what_was_not_read) {
+  open_port();
+  TEST_ASSERT_EQUAL(0, host_out(2, (const uint8_t *)"old", 3));
+  set_dtr(0);
+  set_dtr(1);
+  TEST_ASSERT_EQUAL(0, host_out(2, (const uint8_t *)"new", 3));
+  TEST_ASSERT_EQUAL(3, cdc_read(got, sizeof got));
+  TEST_ASSERT_EQUAL_MEMORY("new", got, 3);
+  TEST_ASSERT_EQUAL(0, cdc_read(got, sizeof got));
+}
+
 TEST(test_suspended_port_is_closed) {
   set_dtr(1);
   uint32_t closes = cdc_close_count();
