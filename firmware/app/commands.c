@@ -155,7 +155,9 @@ void commands_follow_store(struct app *app, uint64_t now_us) {
     return;
   }
   port_event(CRASH_EVENT_STORED, status != FT_OK);
-  stages_use_stored_pad(&app->stages, &app->found, &app->store.content);
+  if (status == FT_OK && app->store.of_pad) {
+    stages_use_stored_pad(&app->stages, &app->found, &app->store.content);
+  }
   if (app->commands.pending.command != 0) {
     app->commands.pending.result = status == FT_OK ? WIRE_RESULT_DONE : WIRE_RESULT_NOT_NOW;
     acknowledge(app, &app->commands.pending, now_us);

@@ -219,6 +219,9 @@ void stages_use_calibration(struct stages *stages, const struct findings *found,
   condition_stage_use_calibration(&stages->condition, calibration);
   location_stage_use_calibration(&stages->location, calibration);
 #endif
+#if FT_WITH_SLIP
+  slip_reset(&stages->slip); /* other gains move the location */
+#endif
 #if FT_WITH_TANGENTIAL_DOUBT
   doubt_stage_forget_gains(&stages->doubt);
 #endif

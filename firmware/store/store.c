@@ -543,13 +543,14 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
 }
 
 /* has: there is something of this part now. */
-static enum ft_status change(struct store *store, const struct parts *parts, bool puts, bool has) {
+static enum ft_status change(struct store *store, const struct parts *parts, bool puts, bool has, bool of_pad) {
   if (store_is_writing(store)) {
     return FT_ERR_BUSY;
   }
   if (!puts && !has && !store->damaged) {
     return FT_OK;
   }
+  store->of_pad = of_pad;
   put(store, parts);
   return FT_PENDING;
 }
@@ -557,17 +558,17 @@ static enum ft_status change(struct store *store, const struct parts *parts, boo
 enum ft_status store_put_calibration(struct store *store, const struct calibration *calibration) {
   struct parts parts = kept_parts(store);
   parts.calibration = calibration;
-  return change(store, &parts, calibration != NULL, store->content.has_calibration);
+  return change(store, &parts, calibration != NULL, store->content.has_calibration, true);
 }
 
 enum ft_status store_put_settings(struct store *store, const struct store_settings *settings) {
   struct parts parts = kept_parts(store);
   parts.settings = settings;
-  return change(store, &parts, settings != NULL, store->content.has_settings);
+  return change(store, &parts, settings != NULL, store->content.has_settings, false);
 }
 
 enum ft_status store_put_profile(struct store *store, const struct pad_profile *profile) {
   struct parts parts = kept_parts(store);
   parts.profile = profile;
-  return change(store, &parts, profile != NULL, store->content.has_profile);
+  return change(store, &parts, profile != NULL, store->content.has_profile, true);
 }

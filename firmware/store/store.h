@@ -101,6 +101,7 @@ struct store {
   uint16_t record_length;
   uint32_t to_generation;
   uint64_t step_ends_us;
+  bool of_pad; /* calibration or profile changes */
 
   bool damaged; /* what the flash holds is damaged, or of a later firmware: .content is empty */
   struct store_content content;

@@ -231,6 +231,20 @@ TEST(from_touch_tells_what_changed) {
 }
 
 /* While the sensors measure their temperature the frame before goes out again, whole. */
+/* Settings are of no pad: the load that was measured from the touch on goes on. */
+TEST(keeping_settings_in_a_contact_changes_no_load) {
+  pad.from_touch = 1;
+  store_pad();
+  load.later_us = 1800000;
+  load.later_qx_N = 1.5;
+  struct wire_contact contact = last_contact(2200000, 2400000, TANGENTIAL, 0);
+  TEST_ASSERT_FLOAT_WITHIN(0.15f, 1.5f, contact.qx_N);
+  struct wire_packet keep = COMMAND(KEEP, keep, .keep = 1);
+  send_packet(&keep);
+  contact = last_contact(2400000, 2700000, TANGENTIAL, 0);
+  TEST_ASSERT_FLOAT_WITHIN(0.15f, 1.5f, contact.qx_N);
+}
+
 TEST(a_held_frame_repeats_the_load) {
   load.qx_N = 1.2;
   struct wire_packet packet;
