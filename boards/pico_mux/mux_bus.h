@@ -6,8 +6,8 @@
  * by its RESET line, which takes none. In steady state a frame takes 200 us on the bus at 400 kHz for the command (3 selections, 1 write)
  * and 2250 us for the reading (1 write, 15 selections, 15 fetches), and 3 us between two transactions. Sources: TCA9548A datasheet SCPS207;
  * MS5840-02BA datasheet, whose command and answer are transactions of their own; array_bus.h. All sensors sample together; the reading
- * skews nothing. Who does not acknowledge, as it did the last time, is asked once more, which repairs a disturbed transaction for 110 us at
- * most; one that is gone is asked twice once.
+ * skews nothing. A part that acknowledged the last time and does not now is asked once more, which repairs a disturbed transaction for
+ * 110 us at most: one that disappears costs this in its first frame only.
  *
  * A multiplexer that still does not acknowledge is held in reset, which closes its channels whatever state it is in,
  * until the next operation asks it again; its sensors do not acknowledge and the others are not disturbed. So is one

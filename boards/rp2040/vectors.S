@@ -52,9 +52,7 @@ __vectors:
   interrupt timer3_irq_handler, FIRST
   unexpected 1
   interrupt usbctrl_irq_handler, FIRST /* 5 */
-  unexpected 1
-  interrupt pio0_irq_handler, THIRD /* 7 */
-  unexpected 3
+  unexpected 5
   interrupt dma0_irq_handler, THIRD /* 11 */
   unexpected 11
   interrupt i2c0_irq_handler, THIRD /* 23 */

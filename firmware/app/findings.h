@@ -1,5 +1,5 @@
 /* What is known of the frame under way: the scan brings the readings, and each stage (stages.h) adds what it finds. A
- * stage reads what earlier stages have written. Of a held frame all but the frame and the times stays as it was. */
+ * stage reads what earlier stages have written. In a held frame all but .frame and the times keeps its value of the frame before. */
 #pragma once
 
 #include "common/crash.h"

@@ -1,6 +1,6 @@
 /* The jobs of the second processor. A stage that has one asks by worker/worker.h, and gets the answer in a later call
- * or a later frame. Jobs are done in the order of enum job. A build for one processor serves them itself, after the
- * frame's packets, or before them where a stage waits: the answers have the same bits. */
+ * or a later frame. Jobs are done in the order of enum job. While there is no second processor the first serves
+ * them itself, after the frame's packets, or before them where a stage waits: the answers have the same bits. */
 #pragma once
 
 #include "worker/worker.h"
@@ -16,7 +16,7 @@ enum job {
 
 struct jobs {
   struct worker worker[JOBS];
-  bool has_processor;   /* of their own */
+  bool has_processor;   /* the second processor runs them */
   uint32_t starts;      /* of the processor so far: with each one all questions are forgotten */
   uint64_t frame_us;    /* time of the frame under way */
   uint64_t interval_us; /* between it and the frame before */

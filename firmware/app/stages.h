@@ -1,4 +1,4 @@
-/* The stages of a frame, in their order: stages.c lists them, and what each scene leaves out. A stage owns its state;
+/* The stages of a frame: stages.c lists them in their order, and what each scene leaves out. A stage owns its state;
  * its header lists what it reads and writes. What a stage hands on is in findings.h.
  *
  *   condition_stage    pressure above the zero; whether anything touches
@@ -53,7 +53,7 @@ struct stages {
 #endif
 };
 
-/* Of all zeros: sets what the scene starts with. */
+/* Sets what the scene starts with. Zero-initialise before. */
 void stages_start(struct stages *stages);
 
 /* The frame's way, from its readings to what its packets report. taken_us: when the frame was taken, modulo 2^32. */

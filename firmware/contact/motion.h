@@ -85,7 +85,7 @@ struct motion {
   float vx_mm_s, vy_mm_s;
 };
 
-/* Of all zeros: nothing yet. */
+/* Zero-initialise before the first use. */
 struct motion_history {
   struct motion_sums now;        /* with the newest frame in them */
   struct motion_moments moments; /* the same */

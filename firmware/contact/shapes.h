@@ -59,11 +59,10 @@ struct shapes_place {
   float x_mm, y_mm, location_sd_mm;
 };
 
-/* Where the contact is, of which the report and the fit are: the tangential estimate has the location, and where there is none (force
- * NULL), the Gaussian. But neither knows a length, nor the Gaussian a tangential force. So of a long contact, and of a pulled one without
- * an estimate, what lies between that location and the middle that the shape has is part of the standard deviation. It is not the place:
- * rubber that remembers makes a round object look long or pulled, with its middle further off. The standard deviation of a round contact
- * grows where its shape leaves residuals. */
+/* The location to report: that of the tangential estimate, or the Gaussian's where there is none (force NULL). But neither knows a length,
+ * nor the Gaussian a tangential force. So of a long contact, and of a pulled one without an estimate, what lies between that location and
+ * the middle that the shape has is part of the standard deviation. It is not the place: rubber that remembers makes a round object look
+ * long or pulled, with its middle further off. The standard deviation of a round contact grows where its shape leaves residuals. */
 struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit, const struct tangential_force *force);
 
 /* The flags that the report adds to those of a contact. */

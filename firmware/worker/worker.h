@@ -4,7 +4,7 @@
  * a free job. worker_ask() gives it to the worker, and worker_serve() gives it back with the answer in it. Each of the two counts has one
  * writer, so plain atomic loads and stores suffice, between contexts of one processor and between two processors that share memory.
  *
- * A single processor serves itself, right after it has asked. The work depends on the job alone, so the answer has the
+ * A single processor serves itself (app/jobs.h). The work depends on the job alone, so the answer has the
  * same bits wherever it is done.
  *
  * Cost: some 20 Cortex-M0+ cycles a call. */
