@@ -262,7 +262,8 @@ struct wire_health {
   /* the queue was full: whole packets, and each leaves a gap in the sequence */
   uint32_t packets_dropped;
   uint32_t commands_done; /* commands carried out */
-  uint32_t commands_rejected; /* commands that were unknown, out of range or damaged */
+  /* commands that were unknown, out of range, damaged, or not possible at that time */
+  uint32_t commands_rejected;
   uint32_t bus_nacks; /* reads that a sensor did not acknowledge, or that broke off */
   uint32_t bus_timeouts; /* operations on the bus that did not end in time */
   uint32_t bus_recoveries; /* nine clocks, and resets of multiplexers */

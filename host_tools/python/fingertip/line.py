@@ -408,7 +408,7 @@ class Health(NamedTuple):
     commands_done: Annotated[int, Wire("I")]
     """commands carried out"""
     commands_rejected: Annotated[int, Wire("I")]
-    """commands that were unknown, out of range or damaged"""
+    """commands that were unknown, out of range, damaged, or not possible at that time"""
     bus_nacks: Annotated[int, Wire("I")]
     """reads that a sensor did not acknowledge, or that broke off"""
     bus_timeouts: Annotated[int, Wire("I")]

@@ -416,7 +416,7 @@ export interface Health extends Header {
   packets_dropped: number;
   /** commands carried out */
   commands_done: number;
-  /** commands that were unknown, out of range or damaged */
+  /** commands that were unknown, out of range, damaged, or not possible at that time */
   commands_rejected: number;
   /** reads that a sensor did not acknowledge, or that broke off */
   bus_nacks: number;
