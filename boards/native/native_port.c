@@ -142,7 +142,7 @@ void port_sleep(void) {
   if (next_us == UINT64_MAX) {
     stop("the main loop sleeps and nothing will wake it");
   }
-  if (native.running && next_us > native.limit_us) {
+  if (native.running && next_us > native.limit_us && native.now_us < native.limit_us) { /* a wait may end behind it */
     pass_time_to(native.limit_us);
   } else {
     take_event(next_us);
