@@ -54,7 +54,7 @@ def drawn(board, name):
         lines += [sheet.circle(middle + side * x, y, 0.6, "blue") for part, (x, y) in board.dots.items() if board.parts[part][3] == back]
         shown = {part: place for part, place in board.parts.items() if place[3] == back}
         lines += [sheet.rectangle(middle + side * x, y, w, h, "cut") for (part, _), (x, y, w, h, _) in board.pads.items() if part in shown]
-        lines += [sheet.text(middle + side * x, y + 0.8, part, anchor="middle") for part, (x, y, *_) in shown.items()]
+        lines += [sheet.text(middle + side * x, y + 0.4, part, "small" * (part[0] in "RC"), "middle") for part, (x, y, *_) in shown.items()]
     size = 2 * max(right - left, 21) + 20, bottom - top + 22
     return sheet.sheet(f"Circuit board of {name}, both sides, 1:1", left - 4, top - 8, *size, lines + sheet.ruler(left, bottom + 8))
 

@@ -3,7 +3,7 @@
 RULER_mm = 50
 STYLE = (
     "text { font: 2.2px sans-serif } path, rect, circle { stroke: #000; stroke-width: 0.15; fill: none } "
-    ".measure { stroke: #1f5fa8 } .blue { fill: #1f5fa8 } .cut { fill: #e8e8e8 }"
+    ".small { font-size: 1px } .measure { stroke: #1f5fa8 } .blue { fill: #1f5fa8 } .cut { fill: #e8e8e8 }"
 )
 
 

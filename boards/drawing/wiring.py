@@ -253,14 +253,10 @@ def drawn_multiplexed(board):
     lines = [f'  <rect class="chip" x="20" y="80" width="140" height="{sync_y - 80 + 20}" rx="8"/>']
     lines.append(text(34, 104, "Raspberry Pi Pico", "title"))
     lines += gpio(sda_y, w["pin_sda"], right, "SDA") + gpio(scl_y, w["pin_scl"], right, "SCL")
-    lines += [
-        path("wire", f"M{right} {sda_y}H{sda_x}"),
-        path("scl", f"M{right} {scl_y}H{scl_x}"),
-        node(sda_x, sda_y),
-        node(scl_x, scl_y, "dot"),
-        path("wire", f"M{sda_x} {tops[0] + 40}V{max(tops[-1] + 40, sda_y)}"),
-        path("scl", f"M{scl_x} {tops[0] + 62}V{max(tops[-1] + 62, scl_y)}"),
-    ]
+    lines += [path("wire", f"M{right} {sda_y}H{sda_x}"), path("scl", f"M{right} {scl_y}H{scl_x}")]
+    lines += [node(sda_x, sda_y), node(scl_x, scl_y, "dot")]
+    lines.append(path("wire", f"M{sda_x} {tops[0] + 40}V{max(tops[-1] + 40, sda_y)}"))
+    lines.append(path("scl", f"M{scl_x} {tops[0] + 62}V{max(tops[-1] + 62, scl_y)}"))
     for x, y, kind in ((185, sda_y, "node"), (215, scl_y, "dot")):
         lines += [node(x, y, kind), f'  <use href="#pullup" x="{x}" y="{y}"/>', path("rail", f"M{x + 18} {y - 23}V70")]
     lines += [text(178, 62, f"3V3 (pin {pico.pin('3V3')})"), text(166, scl_y + 18, f"{ohms(ohm['bus'])} each", "small")]
