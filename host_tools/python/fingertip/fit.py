@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from .arrays import Firmware, MeasureError, q10, round_half_away, table_of, usable_of
 from .errors import InputError
-from .files import printable, reporter, run_tool, write_text
+from .files import check_output, printable, reporter, run_tool, write_text
 from .line import Flag
 
 FloatArray = npt.NDArray[np.float64]
@@ -390,6 +390,8 @@ def calibrate(
 ) -> dict[str, Any]:
     """What the tool's calibration finds of rows of one weight, of force_N if it is known, at different places: at most 40 of them, from
     all over the file. As fit() takes it. Raises InputError where they do not determine the gains."""
+    if force_N is not None and not 0.1 <= force_N <= 50:
+        raise InputError(f"a weight of {force_N:g} N is out of range; give 0.1 to 50 N, which are 10 to 5100 grams")
     of_pad = read_pad(pad)
     reading_Pa = _readings(pressures, of_pad, unit, zero_rows, noise_Pa)
     pressed = np.flatnonzero(np.nan_to_num(reading_Pa).max(axis=1) >= PLACEMENT_Pa)
@@ -397,7 +399,7 @@ def calibrate(
     t_s = EVERY_s * np.arange(len(reading_Pa))
     found, sensors, _ = firmware().calibrate(*of_pad[1:4], t_s[None], reading_Pa[None], noise_Pa, force_N=force_N or 1.0)
     if found[0]["state"] != 1:
-        raise InputError(f"not calibrated from {len(t_s)} placements: {found[0]['reason'].decode()} (host_tools/README.md, Calibrate)")
+        raise InputError(f"not calibrated from {len(t_s)} placements: {found[0]['text'].decode()}")
     return response_of(found[0], sensors[0]) | ({} if force_N else {"force_scale": 0.0, "force_scale_sd": 0.0})
 
 
@@ -481,10 +483,15 @@ def main(argv: list[str]) -> int:
     parser.add_argument("-o", "--output", metavar="FILE", help="default: standard output")
     parser.add_argument("--overwrite", action="store_true", help="replace it if it exists")
     options = parser.parse_args(argv)
+    if options.weight is not None and not options.calibrate:
+        parser.error("--weight is that of --calibrate; give both")
+    if options.calibrate and options.calibration is not None:
+        parser.error("--calibrate makes a calibration, and takes no --calibration")
     warn = reporter(parser.prog)
     warnings.showwarning = lambda message, *_: warn(f"warning: {message}")
-    if options.output and os.path.exists(options.output) and not options.overwrite:
-        raise InputError(f"{options.output}: exists already; give --overwrite to replace it")
+    if options.output is not None:
+        pad = options.pad if options.pad.endswith(".json") else None
+        check_output(options.output, options.file, options.calibration, pad, replace=options.overwrite)
     pressures, time_s = read_table(options.file, len(read_pad(options.pad).x_mm), options.first, options.time)
     common = {"unit": options.unit, "zero_rows": options.zero, "noise_Pa": options.noise}
     if options.calibrate:
@@ -494,7 +501,7 @@ def main(argv: list[str]) -> int:
         found = fit(pressures, options.pad, calibration=options.calibration, time_s=time_s, **common)
         columns = ({} if time_s is None else {"t_s": time_s}) | found
         text = "".join(f"{','.join(cells)}\n" for cells in [columns, *zip(*(_texts(values, name) for name, values in columns.items()))])
-    write_text(options.output, text) if options.output else sys.stdout.write(text)
+    write_text(options.output, text) if options.output is not None else sys.stdout.write(text)
     return 0
 
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from . import host_time
 from .device import Fingertip
 from .errors import BadValueError, FingertipError, InputError
-from .files import run_tool
+from .files import check_range, run_tool
 from .frames import Q10, Frame
 from .group import Fingertips
 from .messages import DIAGNOSTICS_TYPE, FRAME_TOPICS, FrameMessages, diagnostics, health_status, name_in_ros
@@ -210,20 +210,18 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--domain", type=int, metavar="N", help="0 to 232; as ROS_DOMAIN_ID has it, if not given")
     parser.add_argument("--seconds", type=float, default=math.inf, metavar="S", help="how long; until Ctrl-C, if not given")
     options = parser.parse_args(argv)
+    check_range("seconds", options.seconds, 0, math.inf)
     stop = until_ended()
-    try:
-        with Publisher(options.domain) as publisher:
-            fingertips = Fingertips(options.port, serials=options.device, reconnect=True)
-            end_s = host_time.now_s() + options.seconds
-            names = [f"/fingertip/{name_in_ros(serial)}" for serial in fingertips.by_serial]
-            print(f"domain {publisher.domain}: {' '.join(names)}", flush=True)
-            publish(publisher, fingertips, lambda: stop.is_set() or host_time.now_s() >= end_s)
-            for serial, tip in fingertips.by_serial.items():
-                frames = publisher.sent[f"/fingertip/{name_in_ros(serial)}/contact"]
-                print(f"{serial}: {frames} frames, lost {tip.statistics.dropped_packets + tip.overrun_frames}")
-            print("".join(f"{name}: {count} messages\n" for name, count in publisher.sent.items()) + f"refused: {publisher.refused}")
-    except FingertipError as error:
-        raise InputError(str(error)) from None
+    with Publisher(options.domain) as publisher:
+        fingertips = Fingertips(options.port, serials=options.device, reconnect=True)
+        end_s = host_time.now_s() + options.seconds
+        names = [f"/fingertip/{name_in_ros(serial)}" for serial in fingertips.by_serial]
+        print(f"domain {publisher.domain}: {' '.join(names)}", flush=True)
+        publish(publisher, fingertips, lambda: stop.is_set() or host_time.now_s() >= end_s)
+        for serial, tip in fingertips.by_serial.items():
+            frames = publisher.sent[f"/fingertip/{name_in_ros(serial)}/contact"]
+            print(f"{serial}: {frames} frames, lost {tip.statistics.dropped_packets + tip.overrun_frames}")
+        print("".join(f"{name}: {count} messages\n" for name, count in publisher.sent.items()) + f"refused: {publisher.refused}")
     return 0
 
 

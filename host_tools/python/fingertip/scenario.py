@@ -1,6 +1,6 @@
 """Writes a scenario: what the fifteen sensors feel over time, and the truth behind it.
 
-    fingertip-scenario NAME -o FILE.csv [--seconds S] [--seed N]
+    fingertip-scenario NAME -o FILE.csv [--overwrite] [--seconds S] [--seed N]
 
 ideal   ideal Gaussian presses (sigma 5.7 mm) of 0.5 to 20 N at random places of the array; no slip
 demo    taps of different force and place, two slips, a figure-eight stroke; 10 s
@@ -141,13 +141,14 @@ def main(argv):
     parser.add_argument("-o", "--output", required=True, metavar="FILE.csv")
     parser.add_argument("--seconds", type=float, metavar="S", help="length; default: that of the scenario")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the random places and forces; default 1")
+    parser.add_argument("--overwrite", action="store_true", help="replace the file if it exists")
     options = parser.parse_args(argv)
     make, usual, description = SCENARIOS[options.name]
     seconds = usual if options.seconds is None else options.seconds
     check_range("seconds", seconds, 1, 3600)
     if options.seed < 0:
         raise InputError(f"--seed {options.seed} is out of range; give 0 or more")
-    check_output(options.output)
+    check_output(options.output, replace=options.overwrite)
     motion = make(seconds, np.random.default_rng(options.seed))
     metadata = {
         "name": options.name,

@@ -2,14 +2,13 @@
 
 import argparse
 import contextlib
+import functools
 import json
 import math
-import os
 import re
 import sys
 
-from .errors import FingertipError, InputError
-from .files import SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm, check_output, printable, read_lines, write_text
+from .files import SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm, check_output, printable, read_lines, run_tool, write_text
 from .validation.assess import Card
 from .validation.card import card_html, card_json
 from .validation.live import validate_live
@@ -44,12 +43,18 @@ def _number(low, high, unit):
     return number, f" ({low} to {high} {unit})"
 
 
+def _name(text):
+    if not text:
+        raise argparse.ArgumentTypeError("takes a name, and this one is empty")
+    return text
+
+
 def _parser():
     parser = _Parser(prog=NAME, description=__doc__.split(":")[0] + ".", allow_abbrev=False, usage=f"{NAME} [OPTIONS]")
     parser.formatter_class = lambda prog: argparse.HelpFormatter(prog, max_help_position=28, width=80)
 
-    def add(*names, help, number=(str, ""), **more):
-        parser.add_argument(*names, help=help + number[1], **({"type": number[0]} if number[1] else {}), **more)
+    def add(*names, help, number=(_name, ""), **more):
+        parser.add_argument(*names, help=help + number[1], **({} if "action" in more else {"type": number[0]}), **more)
 
     kinds, colours = ("auto", "socket", "serial"), ("auto", "truecolour", "256", "plain")
     transport = "socket (of fingertip serve, which reaches one by libusb too), serial, or auto: the first of these that there is"
@@ -119,13 +124,6 @@ def _check(options):
         )
 
 
-def _check_output(path, overwrite):
-    """Before any work. Raises InputError."""
-    if os.path.exists(path) and not overwrite:
-        raise InputError(f"{path}: exists; give --overwrite or another name")
-    check_output(path)
-
-
 def _print(card):
     for figure in card.figures:
         print(f"{figure.value:9.{figure.digits}f} {figure.unit:7s} {figure.text}")
@@ -140,17 +138,23 @@ def _print(card):
 
 
 def run(argv):
-    options = _options(argv)
-    for path in (options.template, options.output, options.figures, options.record):
-        if path:
-            _check_output(path, options.overwrite)
+    """Exit status."""
+    try:
+        options = _options(argv)
+    except WrongUsage as error:
+        print(f"fingertip: {printable(str(error))}", file=sys.stderr)
+        return 2
+    outputs = [options.template, options.output, options.figures, options.record, options.form]
+    for i, path in enumerate(outputs):
+        if path is not None:
+            check_output(path, options.recording, *outputs[:i], replace=options.overwrite or path == options.form)
     form = "\n".join(read_lines(options.form)) + "\n" if options.form else ""
     if options.template:
         array = array_of(SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm)
         draw = template_pdf if options.template.lower().endswith(".pdf") else template_svg
         write_text(options.template, draw(array))
         print(f"{printable(options.template)}: print it at 100 %, and measure its line of {RULER_mm:.0f} mm")
-        return
+        return 0
     measured = read_measurement(options.recording, options.device) if options.recording else validate_live(options)
     card = Card(measured, printable(options.recording or options.record))
     if options.output:
@@ -161,24 +165,8 @@ def run(argv):
         known = {figure.key: figure.shown(figure.value) for figure in card.figures}
         write_text(options.form, re.sub(r"\{(\w+)\}", lambda key: known.get(key[1], "not measured"), form))
     _print(card)
+    return 0
 
 
-def main(argv):
-    """Exit status."""
-    try:
-        run(argv)
-        sys.stdout.flush()
-        return 0
-    except WrongUsage as error:
-        text, status = str(error), 2
-    except (FingertipError, InputError) as error:
-        text, status = str(error), 1
-    except KeyboardInterrupt:
-        text, status = "interrupted", 1
-    print(f"fingertip: {printable(text)}", file=sys.stderr)
-    return status
-
-
-def command():
-    """The console command fingertip-validate."""
-    return main(sys.argv[1:])
+command = functools.partial(run_tool, "fingertip", run)
+"""The console command fingertip-validate."""

@@ -57,7 +57,7 @@ def scenario(folder, name, seconds, stem=None):
     """ "wander" touches from 0.65 s on; "rest" never."""
     path = pathlib.Path(folder) / f"{stem or name}.csv"
     if name != "rest":
-        run(sys.executable, ROOT / "host_tools/python", "scenario", name, "-o", path, "--seconds", f"{seconds:g}")
+        run(sys.executable, ROOT / "host_tools/python", "scenario", name, "-o", path, "--seconds", f"{seconds:g}", "--overwrite")
         return path
     return pressed(path, name, [0, seconds], np.zeros((2, 15)))
 

@@ -10,7 +10,7 @@
 using namespace fingertip::calibrating;
 using namespace fingertip::measure;
 
-MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(solved), FIELD(has_own), FIELD(width_mm), FIELD(residual_share),
+MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(text), FIELD(solved), FIELD(has_own), FIELD(width_mm), FIELD(residual_share),
                FIELD(sigma_sd_mm), FIELD(dip), FIELD(dip_sd), FIELD(position_mm), FIELD(halves_shape), FIELD(halves_gauge),
                FIELD(force_scale), FIELD(force_scale_sd), FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(dip_share), FIELD(dip_sd_mm),
                FIELD(worst_shape_sd), FIELD(force_share), FIELD(ellipse), FIELD(offset_share), FIELD(drift_share), FIELD(slope),
@@ -23,6 +23,7 @@ static calibration found_by(const Judgement &judgement, const Shape &shape) {
   calibration found{};
   found.state = static_cast<std::int32_t>(judgement.state);
   std::strncpy(found.reason, name_of(judgement.reason), sizeof found.reason - 1);
+  std::strncpy(found.text, judgement.text.c_str(), sizeof found.text - 1);
   found.solved = solution.solved;
   found.width_mm = solution.sigma_mm;
   found.residual_share = solution.residual_share;

@@ -184,7 +184,21 @@ class Fit(unittest.TestCase):
             np.testing.assert_allclose([float(row["x_mm"]) for row in rows], found["x_mm"], atol=1e-5)
             self.assertIn("10 columns, and the pad has 8 sensors", run("--pad", "2x4", status=1))
             run(*right, "-o", out)
-            self.assertIn("--overwrite", run(*right, "-o", out, status=1))
+            for options, words in (
+                ((*right, "-o", out), "--overwrite"),
+                ((*right, "-o", path, "--overwrite"), "presses.csv: is named twice"),
+                ((*right, "-o", out, "--calibration", out, "--overwrite"), "out.csv: is named twice"),
+                (("--pad", "none", "-o", folder), "is a folder"),
+                (("--pad", "none", "-o", f"{folder}/no/out.csv"), "there is no folder"),
+                (("--pad", "none", "-o", ""), "is a folder"),
+                ((*right, "--calibrate", "--weight", "nan"), "a weight of nan N is out of range"),
+                ((*right, "--calibrate"), "the pad's width and dip do: the sensors are alike, or something changed"),
+            ):
+                self.assertIn(words, run(*options, status=1))
+            for options in (("--weight", "300"), ("--calibrate", "--calibration", out)):
+                self.assertIn("--calibrate", run(*right, *options, status=2))
+            done = subprocess.run(["sh", "-c", '"$0" "$@" > /dev/full', FINGERTIP, "fit", path, *right], stderr=subprocess.PIPE, text=True)
+            self.assertEqual((done.returncode, done.stderr), (1, "fingertip fit: standard output: No space left on device\n"))
             for head, columns, options, words in (
                 ("x,y", np.c_[x_mm, x_mm, readings_Pa], ("--first", "2"), 'column 2, of sensor 0, is "y", no pressure; --first N'),
                 ("", np.c_[readings_Pa, x_mm], (), "column 1 of 9 would be the time, and does not rise; give --first N"),

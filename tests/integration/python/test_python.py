@@ -102,7 +102,7 @@ class ToolTest(unittest.TestCase):
 
     def scenario(self, name="demo", *arguments):
         path = self.folder / f"{name}.csv"
-        self.tool("scenario", name, "-o", path, *arguments)
+        self.tool("scenario", name, "-o", path, "--overwrite", *arguments)
         return path
 
     def recording(self, scenario, rate_Hz=200, zero_s=0.25, change=lambda row: row, until_s=None, end=True, columns=RECORDING_COLUMNS):
@@ -199,6 +199,9 @@ class Scenarios(ToolTest):
         self.assertIn("1 to 3600", self.error("scenario", "demo", "-o", self.folder / "x", "--seconds", "nan"))
         self.assertIn("0 or more", self.error("scenario", "demo", "-o", self.folder / "x", "--seed", "-1"))
         self.assertIn("choose another place", self.error("scenario", "demo", "-o", self.folder / "no" / "x"))
+        self.assertIn("give --overwrite", self.error("scenario", "demo", "-o", self.scenario()))
+        with mock.patch("fingertip.scenario.write_scenario", side_effect=KeyboardInterrupt):
+            self.assertEqual(self.error("scenario", "demo", "-o", self.folder / "x"), "fingertip-scenario: interrupted\n")
 
 
 class Evaluation(ToolTest):

@@ -267,8 +267,12 @@ class ValidateTest(unittest.TestCase):
 
     def run_validate(self, *arguments, status=0):
         """Output and errors."""
-        with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
-            ended = validate.main(list(arguments))
+        with (
+            contextlib.redirect_stdout(io.StringIO()) as out,
+            contextlib.redirect_stderr(io.StringIO()) as err,
+            mock.patch.object(sys, "argv", ["", *arguments]),
+        ):
+            ended = validate.command()
         self.assertEqual(ended, status, (arguments, out.getvalue(), err.getvalue()))
         return out.getvalue(), err.getvalue()
 
@@ -443,14 +447,28 @@ class Command(ValidateTest):
             ([*live, "--pull", "5"], '--pull: takes 10 to 1000 grams, not "5"; see fingertip validate --help'),
             ([*live, "--thread-height", "3"], "--thread-height requires --pull"),
             ([*live, "--colour", "pink"], "--colour: invalid choice: 'pink' (choose from "),
+            (["--from", "r.csv", "-o", ""], "-o/--output: takes a name, and this one is empty"),
             ([*live, "--bogus"], "unrecognized arguments: --bogus; see fingertip validate --help"),
         ):
             out, err = self.run_validate(*options, status=2)
             self.assertEqual((out, err.count("\n")), ("", 1))
             self.assertTrue(err.startswith("fingertip: ") and words in err, err)
         self.assertEqual(os.listdir(self.folder), [])
-        for options, words in ((["-o", self.folder + "/no/c.html"], "there is no folder"), (["-o", __file__], "exists; give --overwrite")):
-            self.assertIn(words, self.run_validate("--from", "r.csv", *options, status=1)[1])
+        form, other = self.folder + "/form.md", self.folder + "/other.csv"
+        pathlib.Path(form).touch()
+        os.symlink(self.csv, other)
+        for options, words in (
+            (["-o", self.folder + "/no/c.html"], "there is no folder"),
+            (["-o", __file__], "exists; give --overwrite"),
+            (["-o", self.csv], "is named twice"),
+            (["-o", self.card, "--figures", other], "other.csv: is named twice"),
+            (["-o", self.card, "--figures", self.folder + "/../" + os.path.basename(self.folder) + "/card.html"], "is named twice"),
+            (["-o", form, "--form", form], "is named twice"),
+            (["-o", self.card, "--form", "/dev/no/form.md"], "there is no folder"),
+        ):
+            self.assertIn(words, self.run_validate("--from", self.csv, *options, status=1)[1])
+        twice = ("--weight", "300", "--record", self.csv, "-o", other)
+        self.assertIn("is named twice", self.run_validate(*twice, status=1)[1])
 
     def test_without_the_solver_it_states_what_to_install(self):
         with mock.patch.dict(os.environ, {"FINGERTIP_TOOL": "", "PATH": ""}):
