@@ -70,6 +70,8 @@ def line_py(line):
         "import math",
         "from typing import TYPE_CHECKING, Annotated, Any, NamedTuple",
         "",
+        "from .flags import Flags",
+        "",
         "if TYPE_CHECKING:",
         "    import numpy as np",
         "    import numpy.typing as npt",
@@ -97,7 +99,7 @@ def line_py(line):
     ]
 
     def bits(name, doc, entries, before=(), after=()):
-        text = [f"class {name}(enum.IntFlag):", f'    """{doc}"""', "", *before]
+        text = [f"class {name}(Flags):", f'    """{doc}"""', "", *before]
         for each in entries:
             warning = "warning: " if each.get("warning") else ""
             text.append(f"    {each['name']} = 1 << {each['bit']}  #: {warning}{each['text']}")

@@ -42,14 +42,14 @@ static void print_traits() {
 
 int main() {
   std::printf("\"\"\"Written by host_tools/grasp/grip_table.cpp; change the tables of host_tools/grasp.\"\"\"\n\n"
-              "import dataclasses\nimport enum\n");
+              "import dataclasses\nimport enum\n\nfrom .flags import Flags\n");
   print_settings();
   print_traits();
   std::printf("\n\nclass State(enum.IntEnum):\n");
   for (std::uint8_t state = 0; state < GRIP_STATES; state++) {
     std::printf("    %s = %d\n    \"\"\"%s\"\"\"\n", upper(state_name(state)).c_str(), state, state_text(state).c_str());
   }
-  std::printf("\n\nclass Trouble(enum.IntFlag):\n");
+  std::printf("\n\nclass Trouble(Flags):\n");
   for (std::uint32_t bit = 1; !trouble_names(bit).empty(); bit <<= 1) {
     std::printf("    %s = 0x%X\n", upper(trouble_names(bit)).c_str(), bit);
   }

@@ -277,9 +277,10 @@ def main(argv):
     options = parser.parse_args(argv)
     check_range("keep", options.keep, 1, 10_000_000)
     check_range("latency-ms", options.latency_ms, 0, 1000)
-    ended, report = until_ended(), reporter("fingertip-bridge")
+    report = reporter("fingertip-bridge")
 
-    with open_session(options, options.router, serves=True) as session:
+    with open_session(options, options.router, True, report) as session:
+        ended = until_ended()
         bridge = Bridge(session, options.port, options.keep, options.latency_ms, report, options.commands)
         report(bridge.clock.text)
         try:

@@ -32,6 +32,17 @@ def _in_range(name: str, value: float, span: tuple[float, float], unit: str) -> 
         raise BadValueError(f"{name} {value:g} is out of range; give {span[0]:g} to {span[1]:g} {unit}")
 
 
+def block_end(frames: int | None, seconds: float | None) -> Callable[[list[Frame]], bool]:
+    """Whether these frames are a whole block. Raises BadValueError."""
+    if (frames is None) == (seconds is None):
+        raise BadValueError("give frames or seconds")
+    if seconds is None:
+        _in_range("frames", frames or 0, (1, FRAMES_MAX), "frames")
+        return lambda taken: len(taken) >= (frames or 0)
+    _in_range("seconds", seconds, (1e-6, 86400), "s")
+    return lambda taken: bool(taken) and (taken[-1].t_us - taken[0].t_us >= seconds * 1e6 or taken[-1].run != taken[0].run)
+
+
 Given = Mapping[str, float | str | None]
 
 
@@ -114,6 +125,8 @@ class Fingertip(Settable):
         _in_range("buffer_frames", buffer_frames, (1, FRAMES_MAX), "frames")
         _in_range("latency_ms", latency_ms, (0, 1000), "ms")
         _in_range("timeout_s", timeout_s, (0.01, 3600), "s")
+        if not (serial is None or isinstance(serial, str)):
+            raise BadValueError(f"serial {serial!r} is no text; give sixteen hexadecimal digits in quotes")
         self._settle_s = latency_ms / 1000
         self._reconnect = reconnect
         self._timeout_s = timeout_s
@@ -309,6 +322,8 @@ class Fingertip(Settable):
 
     def latest(self, timeout_s: float | None = None) -> Frame:
         """The newest frame, at once unless it is older than that; takes none away from iteration. Raises GoneError, NoFrameError."""
+        if timeout_s is not None:
+            _in_range("timeout_s", timeout_s, (0, 3600), "s")
         if self._line.error:
             raise self._line.error
         patience_s = self.patience_s if timeout_s is None else timeout_s
@@ -319,19 +334,21 @@ class Fingertip(Settable):
         return latest
 
     def read_block(self, frames: int | None = None, seconds: float | None = None) -> Block:
-        """The next frames as arrays: their number (1 to 1048576), or those of this time by the device (above 0). Fewer if it is closed."""
-        if (frames is None) == (seconds is None):
-            raise BadValueError("give frames or seconds")
-        if frames is not None:
-            _in_range("frames", frames, (1, FRAMES_MAX), "frames")
-        elif seconds is not None:
-            _in_range("seconds", seconds, (1e-6, 86400), "s")
+        """The next frames as arrays: their number (1 to 1048576), or those of this time by the device (above 0). Fewer if it is closed. What was
+        taken when an error or Ctrl-C ends it is there for the next call, or for iteration."""
+        is_whole = block_end(frames, seconds)
         taken: list[Frame] = []
-        while (frames is None or len(taken) < frames) and (frame := self._take_frame()) is not None:
-            taken.append(frame)
-            if seconds is not None and (frame.t_us - taken[0].t_us >= seconds * 1e6 or frame.run != taken[0].run):
-                break
+        try:
+            while not is_whole(taken) and (frame := self._take_frame()) is not None:
+                taken.append(frame)
+        except BaseException:
+            self.give_back(taken)
+            raise
         return Block(taken)
+
+    def give_back(self, frames: list[Frame]) -> None:
+        """The last that were taken, in their order."""
+        self._queue.extendleft(reversed(frames))
 
     def blocks(self, frames: int) -> Iterator[Block]:
         """Arrays of this number of frames each, without end; the last one may be shorter."""
@@ -407,18 +424,23 @@ class Fingertip(Settable):
 
         Frames are there for iteration at the same time. Raises InputError.
         """
-        if self._recorder:
-            raise BadValueError("it is being recorded already")
+        self.check_recordable()
         raw, port = bool(self._streams & Streams.RAW), {"port": self.description}
         writer = RecordingWriter(path, self._info, replace=replace, raw_expected=raw, extra=port, count=lambda: self.detach(writer) - first)
         first = self.attach(writer)
         return writer
 
+    def check_recordable(self) -> None:
+        """Raises GoneError, BadValueError."""
+        if self._line.error or self.is_closed:
+            raise self._line.error or GoneError(f"{self.description}: closed")
+        if self._recorder:
+            raise BadValueError("it is being recorded already")
+
     def attach(self, recorder: Recorder) -> LineStatistics:
         """It gets every packet from now on, by the reading thread; what the line has counted until now. Raises BadValueError."""
         with self._line.changed:
-            if self._recorder:
-                raise BadValueError("it is being recorded already")
+            self.check_recordable()
             self._recorder = recorder
             return self.statistics
 

@@ -274,7 +274,17 @@ class Recording:
     def tare_Pa(self) -> Array:
         return self.columns.take([f"tare{k}_Pa" for k in range(self._sensors)])
 
+    __iter__ = None  # of columns, or of rows?
+
+    def __len__(self) -> int:
+        return self.columns.rows
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.columns
+
     def __getitem__(self, name: str) -> Array:
+        if name not in self.columns:
+            raise KeyError(f"a recording has no {name!r}, but columns by their names: {', '.join(self.columns)}")
         return self.columns[name]
 
     def __repr__(self) -> str:

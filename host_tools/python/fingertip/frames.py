@@ -165,7 +165,14 @@ class Block(BlockQuantities):
     def __len__(self) -> int:
         return len(self.frame)
 
+    __iter__ = None  # of columns, or of frames?
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._names or name in ("sensors_Pa", "tare_Pa")
+
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        if not isinstance(name, str):
+            raise TypeError(f'a block has no frame {name!r}, but arrays by their names: block["t_us"][0]')
         if not isinstance(values := getattr(self, name, None), np.ndarray):
             near = difflib.get_close_matches(name, self._names, cutoff=0.4)
             raise KeyError(f"a block has no {name}; {'did you mean ' + near[0] if near else 'it has ' + ', '.join(self._names)}")

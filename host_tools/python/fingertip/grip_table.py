@@ -3,6 +3,8 @@
 import dataclasses
 import enum
 
+from .flags import Flags
+
 
 @dataclasses.dataclass(frozen=True)
 class Settings:
@@ -124,7 +126,7 @@ class State(enum.IntEnum):
     """fault; the width stays"""
 
 
-class Trouble(enum.IntFlag):
+class Trouble(Flags):
     FINGER_0_STALE = 0x1
     FINGER_1_STALE = 0x2
     FINGER_0_FROZEN = 0x4

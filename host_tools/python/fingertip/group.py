@@ -9,7 +9,7 @@ from typing import Any
 from . import discovery, host_time
 from .clock import host_now_us
 from .device import Fingertip
-from .errors import BadValueError, InputError, NoFingertipError, NoFrameError
+from .errors import BadValueError, FingertipError, InputError, NoFingertipError, NoFrameError
 from .frames import Frame
 from .line import Capability
 from .recording import JointRecordingWriter
@@ -56,6 +56,8 @@ class Fingertips:
     ) -> None:
         if ports is not None and serials is not None:
             raise BadValueError("give ports or serials")
+        if isinstance(serials, str) or isinstance(ports, (str, os.PathLike)):
+            raise BadValueError("give a list of ports or of serials; Fingertip opens one")
         self._news = host_time.event()
         self._opened: dict[str, Fingertip] = {}
         self._stack = contextlib.ExitStack()
@@ -102,6 +104,8 @@ class Fingertips:
         def count() -> list[LineStatistics]:
             return [tip.detach(side) - before for tip, side, before in zip(fingertips, sides, first)]
 
+        for tip in fingertips:
+            tip.check_recordable()
         infos = [tip.info for tip in fingertips]
         raw = all(info.capabilities & Capability.RAW_STREAM for info in infos)
         writer = JointRecordingWriter(path, infos, replace=replace, count=count, raw_expected=raw)
@@ -109,7 +113,7 @@ class Fingertips:
             for number, tip in enumerate(fingertips):
                 sides.append(_Side(writer, number, tip))
                 first.append(tip.attach(sides[-1]))
-        except BadValueError:
+        except FingertipError:
             count()
             writer.abandon()
             raise

@@ -7,6 +7,8 @@ import enum
 import math
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
+from .flags import Flags
+
 if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
@@ -31,7 +33,7 @@ class Wire(NamedTuple):
     is_map: bool = False
 
 
-class Flag(enum.IntFlag):
+class Flag(Flags):
     """What a frame reports about itself. A quantity may be used only under its VALID flag; without it, it is NaN here."""
 
     CONTACT = 1 << 0  #: a sensor is pressed
@@ -70,7 +72,7 @@ WARNINGS = Flag(0x2A07FF00)
 """The numbers are there, but deserve less trust: look at these before you use them."""
 
 
-class Streams(enum.IntFlag):
+class Streams(Flags):
     """What a fingertip sends unasked."""
 
     NONE = 0
@@ -80,7 +82,7 @@ class Streams(enum.IntFlag):
     ALL = CONTACT | RAW | HEALTH
 
 
-class Capability(enum.IntFlag):
+class Capability(Flags):
     """What a firmware can do."""
 
     FIT = 1 << 0  #: contact packets: location and force; and calibrations
@@ -91,7 +93,7 @@ class Capability(enum.IntFlag):
     SECOND = 1 << 5  #: the second processor runs, now; without it the first does its work, with the same results at fewer frames a second
 
 
-class Stored(enum.IntFlag):
+class Stored(Flags):
     """What a fingertip keeps without power."""
 
     CALIBRATION = 1 << 0  #: a calibration, and it is applied; never without capability fit

@@ -24,6 +24,7 @@ import struct
 import subprocess
 import threading
 import types
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from . import host_time
@@ -127,9 +128,9 @@ def until_ended() -> threading.Event:
     return ended
 
 
-def open_session(options: argparse.Namespace, router: bool = False, serves: bool = False) -> Any:
+def open_session(options: argparse.Namespace, router: bool = False, serves: bool = False, report: Callable[[str], None] = print) -> Any:
     """A zenoh.Session; serves: others come to it where no option has it otherwise. Nothing is found by multicast, unless --config has that.
-    Raises InputError."""
+    Until it is open, which may take forever, SIGINT and SIGTERM end the program: until_ended comes after. Raises InputError."""
     zenoh = zenoh_module()
     zenoh.init_log_from_env_or("error")
     try:
@@ -149,6 +150,10 @@ def open_session(options: argparse.Namespace, router: bool = False, serves: bool
             config.insert_json5("connect/exit_on_failure", "false")
             # the wait for a full queue in us, by a thread that may, before a live packet is dropped
             config.insert_json5("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "50000")
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_DFL)
+        if connect:
+            report(f"connecting to {', '.join(connect)}")
         return zenoh.open(config)
     except zenoh.ZError as error:
         raise InputError(f"no Zenoh session: {error}; see --connect, --listen and --config") from None

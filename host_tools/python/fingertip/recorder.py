@@ -505,9 +505,10 @@ def main(argv):
     check_range("seconds", options.seconds, 0, math.inf)
     check_range("clock-bound-us", options.clock_bound_us, 0, 1e9)
     check_output(options.file)
-    ended, report = until_ended(), reporter("fingertip-recorder")
+    report = reporter("fingertip-recorder")
 
-    with open_session(options) as session:
+    with open_session(options, report=report) as session:
+        ended = until_ended()
         infos = find(session, options.serial, options.expect, options.wait)
         notes = judge_clocks(session, list(infos), options.clock_bound_us, options.undisciplined)
         extra = {f"{number}/host_clock": notes[serial] for number, serial in enumerate(infos)}

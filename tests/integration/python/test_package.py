@@ -146,6 +146,7 @@ class Streaming(DeviceTest):
     def test_every_frame_in_order_then_gone(self):
         with self.device("frames=300"), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
             self.assertEqual((tip.serial, tip.info.board, tip.info.sensors), (SERIAL, "pico_mux", 15))
+            self.assertRaises(fingertip.GoneError, tip.read_block, 1000)  # what it had taken is still there
             frames = self.until_gone(tip)
             self.assertEqual([frame.frame for frame in frames], list(range(1, 301)))
             self.assertTrue(all(frame.has_contact and frame.has_raw and frame.run == 0 for frame in frames))
@@ -183,6 +184,9 @@ class Streaming(DeviceTest):
             self.assertEqual((len(block), block.sensors_Pa.shape, block.tare_Pa.shape), (50, (50, 15), (50, 15)))
             self.assertRaisesRegex(KeyError, "no force; did you mean force_N", block.__getitem__, "force")
             self.assertRaisesRegex(KeyError, "no len; it has frame, run, ", block.__getitem__, "len")
+            self.assertRaisesRegex(TypeError, "no frame 0, but arrays", block.__getitem__, 0)
+            self.assertRaisesRegex(TypeError, "'Block' object is not iterable", iter, block)
+            self.assertEqual(("x_mm" in block, "sensors_Pa" in block, "x" in block), (True, True, False))
             self.assertRegex(repr([block, tip]), r"<Block of 50 frames in 0\.\d\d s, 50 with .*, <Fingertip \w+ on \w+, .*>")
             np.testing.assert_array_equal(np.diff(block.frame), 1)
             self.assertTrue(np.isnan(block.sensors_Pa[:, 0]).all() and np.isfinite(block.sensors_Pa[:, 1:]).all())
@@ -193,6 +197,7 @@ class Streaming(DeviceTest):
                 self.assertEqual(len(block), 10)
             self.assertGreater(tip.latest().frame, block.frame[0])
             tip.close()
+            self.assertRaisesRegex(fingertip.GoneError, "closed", tip.record, self.path("r.csv"))
             list(tip)  # what waited is still there
             self.assertEqual((len(list(tip)), len(tip.read_block(5))), (0, 0))
 
@@ -285,6 +290,8 @@ class Streaming(DeviceTest):
         self.call("replay", self.path("r.csv"), "--speed", "max")
         recording = fingertip.read_recording(self.path("r.csv"))
         self.assertEqual((recording.end["reason"], recording.end["dropped_packets"]), ("gone", "0"))
+        self.assertEqual((len(recording), "x_mm" in recording, 0 in recording), (len(recording["x_mm"]), True, False))
+        self.assertRaisesRegex(KeyError, "no 0, but columns by their names: t_us, ", recording.__getitem__, 0)
         recorded = {int(frame): i for i, frame in enumerate(recording["frame"])}
         rows = [recorded[frame.frame] for frame in frames if frame.frame in recorded]
         self.assertGreater(len(rows), 200)
@@ -343,7 +350,10 @@ class Commands(DeviceTest):
             self.assertEqual(tip.read_info()._replace(measured_rate_mHz=0), sent._replace(measured_rate_mHz=0))
             self.assertRaises(fingertip.BadValueError, tip.read_block)
             self.assertRaises(fingertip.BadValueError, tip.read_block, 0)
-        for wrong in ({"buffer_frames": 0}, {"latency_ms": -1}, {"timeout_s": 0}):
+            self.assertRaises(fingertip.BadValueError, tip.latest, math.nan)
+        self.assertRaises(fingertip.BadValueError, Fingertips, serials=SERIAL)
+        self.assertEqual((str(Flag.FLAT | Flag.MODEL), f"{Flag(0)}"), ("FLAT|MODEL", "0"))
+        for wrong in ({"buffer_frames": 0}, {"latency_ms": -1}, {"timeout_s": 0}, {"serial": 5}):
             self.assertRaises(fingertip.BadValueError, Fingertip, self.port, **wrong)
 
     def test_refusals_have_their_type(self):

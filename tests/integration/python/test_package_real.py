@@ -67,11 +67,24 @@ class Streaming(DeviceTest):
                     if len(numbers) == 60:
                         break
                 self.assertEqual(numbers, list(range(numbers[0], numbers[0] + 60)))
-                self.assertEqual(len(await tip.read_block(10)), 10)
+                before = await tip.read_block(10)
+                with self.assertRaises(asyncio.TimeoutError):
+                    await asyncio.wait_for(tip.read_block(100_000), 0.2)
+                after = await tip.read_block(30)  # nothing is lost to the one that was cancelled
+                self.assertEqual(after.frame.tolist(), list(range(before.frame[-1] + 1, before.frame[-1] + 31)))
                 with await tip.record(self.csv) as writer:
                     while writer.frames < 20:  # the first frames may have come before it
                         self.assertEqual(len(await anext(tip.blocks(20))), 20)
                     self.assertGreater((await tip.latest()).frame, numbers[-1])
+
+        async def cancelled():
+            opening = asyncio.ensure_future(fingertip.AsyncFingertip(self.port).__aenter__())
+            await asyncio.sleep(0)
+            opening.cancel()
+            with self.assertRaises(asyncio.CancelledError):
+                await opening
+            with Fingertip(self.port):  # the port is free
+                pass
 
         async def gone():
             async with fingertip.AsyncFingertip(self.port, timeout_s=PATIENCE_s) as tip:
@@ -80,6 +93,7 @@ class Streaming(DeviceTest):
 
         with self.device():
             asyncio.run(talk())
+            asyncio.run(cancelled())
         with self.device("frames=30"), self.assertRaises(fingertip.GoneError):
             asyncio.run(gone())
 

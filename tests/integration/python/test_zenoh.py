@@ -358,6 +358,12 @@ class OnZenoh(unittest.TestCase):
         self.assertEqual(frames, [*range(frames[0], frames[again - 1] + 1), *range(1, frames[-1] + 1)])
         self.assertTrue(any("restarted" in event for event in found.events), found.events)
 
+    def test_without_a_router_a_signal_ends_it(self):
+        recorder = self.recorder(self.folder / "x.csv", "--connect", self.endpoint)
+        self.assertEqual(recorder.stderr.readline(), f"fingertip-recorder: connecting to {self.endpoint}\n")
+        recorder.send_signal(signal.SIGINT)
+        self.assertEqual(recorder.wait(PATIENCE_s), -signal.SIGINT)
+
     def test_without_options_it_is_this_computer_alone(self):
         parser = argparse.ArgumentParser()
         network.add_session_options(parser)
@@ -394,14 +400,14 @@ class OnZenoh(unittest.TestCase):
 
     def certificate(self, name, authority=True):
         """name.pem and name.key, by the commands that the example has."""
-        text = (PACKAGE / "zenoh/router.json5").read_text(encoding="utf-8")
+        text = (PACKAGE / "zenoh_examples/router.json5").read_text(encoding="utf-8")
         own, by_authority = re.findall(r"//     (openssl .*)", text)
         command = by_authority.replace("NAME", name).replace("HOST", "localhost") if authority else re.sub(r"\bca\b", name, own)
         subprocess.run(command.split(), cwd=self.folder, check=True, capture_output=True)
 
     def example(self, name, own, **replaced):
-        """A configuration out of host_tools/python/zenoh, with our files and port."""
-        text = (PACKAGE / "zenoh" / name).read_text(encoding="utf-8")
+        """A configuration out of host_tools/python/zenoh_examples, with our files and port."""
+        text = (PACKAGE / "zenoh_examples" / name).read_text(encoding="utf-8")
         for old, new in {
             "/etc/fingertip/zenoh/own": f"{self.folder}/{own}",
             "/etc/fingertip/zenoh": str(self.folder),
