@@ -20,7 +20,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 from boards import BOARDS, DESCRIPTORS, TO_BUILD, image_of  # noqa: E402
 from presentation import BLUE, FAINT, GOAL, INK, ORANGE, plt, save  # noqa: E402
 from emulated import scenario  # noqa: E402
-from fingertip.files import InputError, run_tool  # noqa: E402
+from fingertip.command import InputError, run_tool  # noqa: E402
 from reporting import run  # noqa: E402
 from vcd import read_vcd  # noqa: E402
 

@@ -17,7 +17,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
-from fingertip.files import InputError, check_output, read_lines, run_tool  # noqa: E402
+from fingertip.command import check_output, run_tool  # noqa: E402
+from fingertip.files import InputError, read_lines  # noqa: E402
 from fingertip.grip_file import read_grip  # noqa: E402
 from fingertip.plot import FAINT, INK, MEASURED, SLIPPING, TRUTH, set_style, spans, write_figure  # noqa: E402
 

@@ -42,7 +42,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
-from fingertip.files import InputError, check_output, run_tool, write_bytes  # noqa: E402
+from fingertip.command import check_output, run_tool  # noqa: E402
+from fingertip.files import InputError, write_bytes  # noqa: E402
 
 PATIENCE_s = 120
 SPEED = 8  # times the recorded one, to save time

@@ -16,7 +16,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 sys.path[:0] = [str(HERE), str(ROOT / "host_tools/python"), str(ROOT / "host_tools/demo")]
 import fuzz  # noqa: E402
-from fingertip import files, grip_file  # noqa: E402
+from fingertip import command, files, grip_file  # noqa: E402
 from grasp import read_truth  # noqa: E402
 
 TRUTH = "# fingertip-truth 1\nt_s,slips,slid_mm,force_N\n0.000,0,0.0,0.1\n0.002,1,0.5,2.5\n"
@@ -71,7 +71,7 @@ def main(argv):
                 check(path, prng)
                 read += 1
             except files.InputError as error:
-                assert "\n" not in files.printable(str(error))
+                assert "\n" not in command.printable(str(error))
             except BaseException:
                 print(f"fuzz_files.py: run {run}: {check.__name__} of {data!r}", file=sys.stderr)
                 raise

@@ -16,9 +16,9 @@ import pathlib
 import platform
 
 from . import discovery, host_time, wire
+from .command import check_range, printable, reporter, run_tool
 from .device import Fingertip
 from .errors import FingertipError, InputError
-from .files import check_range, printable, reporter, run_tool
 from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, host_clock, open_session, settings_of, until_ended, zenoh_module
 
 LOOK_s = 1.0  # for fingertips that came

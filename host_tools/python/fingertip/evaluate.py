@@ -36,8 +36,9 @@ import sys
 
 import numpy as np
 
+from .command import check_output, printable, run_tool
 from .files import CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, InputError
-from .files import check_output, printable, read_recording, read_run, read_scenario, recorded_devices, restart_rows, run_tool, write_text
+from .files import read_recording, read_run, read_scenario, recorded_devices, restart_rows, write_text
 
 FORCE_MIN_N = 0.2
 SLIP_MIN_s = 0.05

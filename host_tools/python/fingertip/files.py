@@ -20,7 +20,6 @@ import json
 import math
 import os
 import re
-import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -29,7 +28,8 @@ import numpy.typing as npt
 
 from . import line, recorded
 from .columns import Array, Columns
-from .errors import FingertipError, InputError
+from .command import Path
+from .errors import InputError
 from .frames import Edge, frame_of
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
 from .mcap_recording import MAGIC, Contacts, Damaged, Line, LogClock, McapLineReader, Skipped
@@ -37,8 +37,6 @@ from .recorded import JOINT_COLUMNS, OF_SPREADSHEETS, UNKNOWN_HEADER, Rows, coun
 
 if TYPE_CHECKING:
     import pandas
-
-Path = str | os.PathLike[str]
 
 PITCH_mm = 9.0
 # Sensor k = 5 * strip + position along the strip; origin in the centre of the pad.
@@ -52,58 +50,6 @@ OPTIONAL_COLUMNS = ("Qx_N", "Qy_N", "temperature_degC")  # after the sensors, in
 CONTACT, FIT_VALID, SLIP_VALID, SLIP = map(int, (Flag.CONTACT, Flag.FIT_VALID, Flag.SLIP_VALID, Flag.SLIP))
 TANGENTIAL_VALID, TANGENTIAL_FROM_TOUCH = int(Flag.TANGENTIAL_VALID), int(Flag.TANGENTIAL_FROM_TOUCH)
 MOVING, SLIDING, WARNINGS = map(int, (Flag.MOVING, Flag.SLIDING, line.WARNINGS))
-
-
-def run_tool(name: str, main: Callable[[list[str]], int]) -> int:
-    """Exit status of a command line tool: 0, or 1 after one line on stderr."""
-    try:
-        status = main(sys.argv[1:])
-        sys.stdout.flush()
-        return status
-    except FingertipError as error:
-        text = str(error)
-    except KeyboardInterrupt:
-        text = "interrupted"
-    except OSError as error:  # other files' are InputErrors
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what waits to be written would fail once more
-        if isinstance(error, BrokenPipeError):  # a reader that has left has what it wanted
-            return 0
-        text = f"{error.filename or 'standard output'}: {error.strerror}"
-    print(f"{name}: {printable(text)}", file=sys.stderr)
-    return 1
-
-
-def check_range(name: str, value: float, low: float, high: float) -> None:
-    """Of an option of a command."""
-    if not low <= value <= high:  # false for NaN
-        raise InputError(f"--{name} {value:.10g} is out of range; give {low:.10g} to {high:.10g}")
-
-
-def reporter(name: str) -> Callable[[str], None]:
-    """Of a command: a line on stderr."""
-    return lambda text: print(f"{name}: {printable(text)}", file=sys.stderr, flush=True)
-
-
-def printable(text: str) -> str:
-    """In one line and harmless to a terminal: control characters and stray bytes as \\x1b."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
-
-
-def check_output(path: Path, *others: Path | None, replace: bool = True) -> None:
-    """Fails before any work where write_text or write_bytes would fail, or would replace an input or another output, the others."""
-    if os.path.isdir(path) or not os.path.basename(path):
-        raise InputError(f"{path or repr(path)}: is a folder; give the name of a file in it")
-    for other in others:
-        exist = other is not None and os.path.exists(other) and os.path.exists(path)
-        if other is not None and (os.path.samefile(path, other) if exist else os.path.realpath(path) == os.path.realpath(other)):
-            raise InputError(f"{path}: is named twice, to be read or written; give another name")
-    if os.path.exists(path) and not replace:
-        raise InputError(f"{path}: exists; give --overwrite or another name")
-    folder = os.path.dirname(path) or "."
-    if not os.path.isdir(folder):
-        raise InputError(f"{path}: there is no folder {folder}; choose another place")
-    if not os.access(path if os.path.exists(path) else folder, os.W_OK):
-        raise InputError(f"{path}: it may not be written; choose another place")
 
 
 def read_lines(path: Path) -> list[str]:

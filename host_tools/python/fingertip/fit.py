@@ -22,8 +22,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import Firmware, MeasureError, q10, round_half_away, table_of, usable_of
+from .command import check_output, printable, reporter, run_tool
 from .errors import InputError
-from .files import check_output, printable, reporter, run_tool, write_text
+from .files import write_text
 from .line import Flag
 
 FloatArray = npt.NDArray[np.float64]

@@ -4,8 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from .command import Path
 from .errors import InputError
-from .files import Path, number_of, undamaged
+from .files import number_of, undamaged
 from .grip_table import State
 
 GRIP_WORDS = ("state", "trouble")  # its columns that are names

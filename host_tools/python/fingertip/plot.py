@@ -20,9 +20,10 @@ import numpy as np
 from matplotlib.patches import FancyBboxPatch
 
 from . import host_time
+from .command import check_output, run_tool
 from .evaluate import Comparison, add_recording_options, check_time, load_recording
 from .files import FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError
-from .files import check_output, read_run, read_scenario, recorded_devices, restart_rows, run_tool, write_bytes
+from .files import read_run, read_scenario, recorded_devices, restart_rows, write_bytes
 from .grip_file import read_grip
 
 INK, FAINT, TRUTH, MEASURED, SLIPPING, DOUBTFUL = "#22252e", "#8a8f9c", "#b4bac6", "#1f6fd6", "#d93a3a", "#d08a00"

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from . import host_time, wire
 from .clock import ClockEstimate
+from .command import check_output, check_range, reporter, run_tool
 from .errors import InputError, PacketError
-from .files import check_output, check_range, reporter, run_tool
 from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, open_session, parts_of, until_ended, zenoh_module
 from .line import Capability
 from .recording import JointRecordingWriter

@@ -18,9 +18,9 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from . import host_time
+from .command import check_range, run_tool
 from .device import Fingertip
-from .errors import BadValueError, FingertipError, InputError
-from .files import check_range, run_tool
+from .errors import BadValueError, FingertipError
 from .frames import Q10, Frame
 from .group import Fingertips
 from .messages import DIAGNOSTICS_TYPE, FRAME_TOPICS, FrameMessages, diagnostics, health_status, name_in_ros

@@ -12,8 +12,8 @@ import importlib
 import math
 from typing import Any
 
+from .command import run_tool
 from .errors import FingertipError, InputError
-from .files import run_tool
 from .running_grasp import RunningGrasp
 
 NODE = "fingertip_grasp"

@@ -15,7 +15,8 @@ import functools
 
 import numpy as np
 
-from .files import SENSOR_X_mm, SENSOR_Y_mm, SLIP_SPEED_mm_s, InputError, check_output, check_range, run_tool, write_scenario
+from .command import check_output, check_range, run_tool
+from .files import SENSOR_X_mm, SENSOR_Y_mm, SLIP_SPEED_mm_s, InputError, write_scenario
 
 STEP_s = 1e-3
 SIGMA_mm = 5.7

@@ -8,7 +8,8 @@ import math
 import re
 import sys
 
-from .files import SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm, check_output, printable, read_lines, run_tool, write_text
+from .command import check_output, printable, run_tool
+from .files import SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm, read_lines, write_text
 from .validation.assess import Card
 from .validation.card import card_html, card_json
 from .validation.live import validate_live

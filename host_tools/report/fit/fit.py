@@ -28,7 +28,8 @@ import stiff  # noqa: E402
 import text  # noqa: E402
 from boards import fit_cycles_of  # noqa: E402
 from presentation import BLUE, FAINT, GOAL, INK, judge, plt, save  # noqa: E402
-from fingertip.files import run_tool, write_text  # noqa: E402
+from fingertip.command import run_tool  # noqa: E402
+from fingertip.files import write_text  # noqa: E402
 from measure import Measure  # noqa: E402
 from reporting import Steps, built, finish, option_parser, output_folder, positive, run, write_json  # noqa: E402
 

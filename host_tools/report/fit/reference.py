@@ -16,7 +16,8 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/measure", "python")]
 import presses  # noqa: E402
-from fingertip.files import InputError, check_range, read_recording, run_tool  # noqa: E402
+from fingertip.command import check_range, run_tool  # noqa: E402
+from fingertip.files import InputError, read_recording  # noqa: E402
 from measure import Measure, usable_of  # noqa: E402
 
 SENSORS_MIN = 4

@@ -24,7 +24,7 @@ sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/shared", "r
 import presses  # noqa: E402
 from errors import BAD_mm, BUILT_ITERATIONS, USUAL_ITERATIONS, VALID, quantile
 from errors import WARNINGS as FIT_WARNINGS
-from fingertip.files import run_tool  # noqa: E402
+from fingertip.command import run_tool  # noqa: E402
 from fingertip.line import Flag  # noqa: E402
 from measure import Measure, round_half_away, stream_of  # noqa: E402
 from presentation import BLUE, GOAL, INK, ORANGE, plt, save, tidy  # noqa: E402

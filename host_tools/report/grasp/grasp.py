@@ -21,7 +21,7 @@ sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/p
 import emulated_grasp  # noqa: E402
 import grasp_report  # noqa: E402
 import kinds  # noqa: E402
-from fingertip.files import InputError, run_tool  # noqa: E402
+from fingertip.command import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
 from reporting import Steps, option_parser, output_folder, publish  # noqa: E402
 

@@ -11,7 +11,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from fingertip.files import run_tool  # noqa: E402
+from fingertip.command import run_tool  # noqa: E402
 from presentation import BLUE, GOAL, ORANGE  # noqa: E402
 from reporting import built, figures_printed  # noqa: E402
 

@@ -14,7 +14,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/fit", "report/rate", "report/shared", "report/measure", "python")]
 import arrays  # noqa: E402, adds the path of the next
 import presses  # noqa: E402
-from fingertip.files import run_tool  # noqa: E402
+from fingertip.command import run_tool  # noqa: E402
 from measure import Measure, q10  # noqa: E402
 from presentation import judge  # noqa: E402
 from reporting import Steps, built, option_parser, output_folder, publish  # noqa: E402

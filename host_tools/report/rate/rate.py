@@ -23,7 +23,7 @@ import rate_report  # noqa: E402
 import scenes  # noqa: E402
 from boards import BOARDS, PARALLEL, short  # noqa: E402
 from emulated import CONVERSION_us, FROM_s, Measurement, distribution, scenario  # noqa: E402
-from fingertip.files import InputError, run_tool  # noqa: E402
+from fingertip.command import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
 from reporting import Steps, option_parser, output_folder, publish  # noqa: E402
 

@@ -16,7 +16,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python"), str(ROOT / "host_tools/report/rate")]
 import scenes  # noqa: E402
 from emulated import FROM_s, Measurement, Tools, distribution, scenario  # noqa: E402
-from fingertip.files import InputError, run_tool, write_text  # noqa: E402
+from fingertip.command import run_tool  # noqa: E402
+from fingertip.files import InputError, write_text  # noqa: E402
 from grasp_rate import PAD  # noqa: E402
 from presentation import table_md  # noqa: E402
 

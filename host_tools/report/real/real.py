@@ -31,7 +31,7 @@ import grids  # noqa: E402
 import pace  # noqa: E402
 import real_report  # noqa: E402
 import strips  # noqa: E402
-from fingertip.files import InputError, run_tool  # noqa: E402
+from fingertip.command import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
 from measure import Measure  # noqa: E402
 from reporting import option_parser, output_folder, publish  # noqa: E402

@@ -23,7 +23,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
-from fingertip.files import InputError, run_tool  # noqa: E402
+from fingertip.command import InputError, run_tool  # noqa: E402
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,7 +13,8 @@ import time
 import page
 import text
 from boards import ROOT, TO_BUILD
-from fingertip.files import InputError, check_output, write_text
+from fingertip.command import check_output
+from fingertip.files import InputError, write_text
 from presentation import judge, missed, print_goals
 
 

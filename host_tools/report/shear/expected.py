@@ -15,7 +15,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_tools/report/measure", "host_tools/python")]
 import static  # noqa: E402
-from fingertip.files import InputError, run_tool  # noqa: E402
+from fingertip.command import InputError, run_tool  # noqa: E402
 from reporting import contacts_of  # noqa: E402
 
 PADS = 200

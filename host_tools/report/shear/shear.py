@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_tools/report/measure", "host_tools/python")]
 
 import shear_report  # noqa: E402
-from fingertip.files import run_tool  # noqa: E402
+from fingertip.command import run_tool  # noqa: E402
 from reporting import add_parts, contacts_of, figures_kept, given, option_parser, output_folder, positive, report_of_parts  # noqa: E402
 
 # part: what it measures

@@ -25,7 +25,7 @@ import one_press  # noqa: E402
 import over_time  # noqa: E402
 import truth_report  # noqa: E402
 import zero_and_gate  # noqa: E402
-from fingertip.files import run_tool  # noqa: E402
+from fingertip.command import run_tool  # noqa: E402
 from measure import Measure  # noqa: E402
 from reporting import add_parts, figures_kept, option_parser, report_of_parts  # noqa: E402
 

@@ -20,7 +20,7 @@ sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_
 
 import two_report  # noqa: E402
 from boards import fit_cycles_of  # noqa: E402
-from fingertip.files import run_tool  # noqa: E402
+from fingertip.command import run_tool  # noqa: E402
 from reporting import add_parts, built, contacts_of, figures_printed, given, option_parser, positive, report_of_parts  # noqa: E402
 
 # part: what it does

@@ -18,7 +18,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from fingertip.files import InputError, run_tool  # noqa: E402
+from fingertip.command import InputError, run_tool  # noqa: E402
 from reporting import built  # noqa: E402
 
 PACKAGE = ROOT / "host_tools/python"

@@ -23,7 +23,8 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
 import cards  # noqa: E402
-from fingertip.files import SLIP, InputError, run_tool  # noqa: E402
+from fingertip.command import run_tool  # noqa: E402
+from fingertip.files import SLIP, InputError  # noqa: E402
 from fingertip.line import Flag  # noqa: E402
 from presentation import BLUE, FAINT, ORANGE, judge, plt, save  # noqa: E402
 from playing import PAPER_RATE_Hz, PRIOR_WIDTH_mm, STIFF_LAYER_mm, Workshop  # noqa: E402

@@ -12,7 +12,7 @@ import numpy as np
 from .. import host_time
 from ..device import Fingertip
 from ..errors import FingertipError, GoneError, InputError
-from ..files import printable
+from ..command import printable
 from ..frames import Q10
 from ..line import Capability, Flag
 from ..recording import RecordingWriter, info_metadata

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..files import printable, read_recording
+from ..command import printable
+from ..files import read_recording
 from ..frames import Q10
 from ..line import SENSOR_LISTS, Flag
 from .placements import Placement, PlacementFinder, Reading
