@@ -83,8 +83,7 @@ class Streaming(DeviceTest):
             opening.cancel()
             with self.assertRaises(asyncio.CancelledError):
                 await opening
-            with Fingertip(self.port):  # the port is free
-                pass
+            Fingertip(self.port).close()  # which is free
 
         async def gone():
             async with fingertip.AsyncFingertip(self.port, timeout_s=PATIENCE_s) as tip:
