@@ -1,5 +1,6 @@
 """The columns of a recording, narrow until one is asked for."""
 
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from .frames import Q10
 
 Array = npt.NDArray[np.float64]
 _BLOCK_rows = 4096
+_KEPT_bytes = 40_000_000  # of columns that were made; one of an hour
 _NARROW = 2.0**32 - 1  # a wider span of whole numbers is kept as doubles
 _SENT = {"h": (100.0, 2), "i": (Q10, 4)}  # by struct's codes: as parts of the unit, and the decimals in text
 
@@ -30,8 +32,9 @@ def shortest(values: npt.NDArray[np.float32]) -> Array:
 
 
 class Columns(Mapping[str, Array]):
-    """By its name, a column's number for each row, NaN where the cell is empty. It is made when it is first asked for, and kept. Before that
-    each block has the distance of its numbers, or of a float's bits, from the least: in as many bytes as that needs, and none where all are the same."""
+    """By its name, a column's number for each row, NaN where the cell is empty; not to be changed. It is made when it is asked for, and kept while
+    someone has it, or there is room. Each block has the distance of its numbers, or of a float's bits, from the least: in as many bytes as that
+    needs, and none where all are the same."""
 
     def __init__(self, codes: Mapping[str, str], shown: Sequence[str], absent: Sequence[str]) -> None:
         """codes: struct's, by names. shown: the names to be asked for; absent: those that have no number."""
@@ -42,7 +45,8 @@ class Columns(Mapping[str, Array]):
         self._sent = len(self._codes) - len(self._scales)  # from here on
         self._waiting: list[Array] = []
         self._blocks: list[tuple[int, list[Any]]] = []  # rows, and of each column the least number and the distances, or doubles
-        self._made: dict[str, Array] = {}
+        self._made: dict[str, Array] = {}  # the last one asked for at the end
+        self._held: weakref.WeakValueDictionary[str, Array] = weakref.WeakValueDictionary()
         self.rows = 0
 
     def append(self, table: Array, lines: Sequence[int], times_us: Sequence[float]) -> None:
@@ -72,14 +76,14 @@ class Columns(Mapping[str, Array]):
         self._blocks.append((whole.shape[1], block))
 
     def take(self, names: Sequence[str]) -> Array:
-        """[row, name] of columns that are not shown; once."""
+        """[row, name]; once, of columns that are not shown."""
         if any(map(len, self._waiting)):
             self._pack()
         found = np.empty((self.rows, len(names)))
         for to, name in enumerate(names):
             at, code, begin = list(self._codes).index(name), self._codes[name], 0
             for count, block in self._blocks:
-                kept, block[at] = block[at], None
+                kept, block[at] = block[at], block[at] if name in self._shown else None
                 if isinstance(kept, tuple):
                     words = np.zeros((len(kept[1]), 4), np.uint8)
                     words[:, : kept[1].shape[1]] = kept[1]
@@ -97,9 +101,15 @@ class Columns(Mapping[str, Array]):
             return np.broadcast_to(np.nan, self.rows)  # without memory
         if name not in self._shown:
             raise KeyError(name)
-        if name not in self._made:
-            self._made[name] = self.take([name])[:, 0]
-        return self._made[name]
+        column = self._held.get(name)
+        if column is None:
+            self._held[name] = column = self.take([name])[:, 0]
+            column.flags.writeable = False
+        self._made.pop(name, None)
+        self._made[name] = column
+        while len(self._made) > 1 and sum(each.nbytes for each in self._made.values()) > _KEPT_bytes:
+            del self._made[next(iter(self._made))]
+        return column
 
     def __iter__(self) -> Iterator[str]:
         return iter((*self._shown, *self._absent))

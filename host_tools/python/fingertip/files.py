@@ -195,8 +195,8 @@ def write_scenario(path: Path, metadata: Mapping[str, Any], columns: Mapping[str
 class Recording:
     """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor] as the file has them (valid has those that are
     measurements), events and event_lines, their numbers in the file, end; packets, those that are no frame: (type, {field: text});
-    line_numbers[n] of the rows in the file; time_us[n] on the recorder's clock, None in a recording of one. An array is made when it is first asked
-    for: an hour at 1309 frames a second takes 0.95 GB, and 0.04 more for each column that was asked for."""
+    line_numbers[n] of the rows in the file; time_us[n] on the recorder's clock, None in a recording of one. An array is made when it is asked for:
+    an hour at 1309 frames a second takes 0.95 GB, and 0.04 more for each column that someone holds. Columns are not to be changed."""
 
     def __init__(self, reading: "_Reading", skipped_lines: int) -> None:
         assert reading.columns is not None

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import weakref
 from unittest import mock
 
 FINGERTIP, FAKE_DEVICE = (os.path.abspath(path) for path in sys.argv[1:3])
@@ -72,6 +73,16 @@ class TestMcap(unittest.TestCase):
         bag.write_bytes(data)
         said = bags.call(FINGERTIP, "convert", bag, path, "--salvage", "--overwrite").stderr
         self.assertRegex(said, r"edited.mcap: byte \d+: a chunk .*\n(.*\n)*.*edited.mcap: \d+ damaged lines skipped\n")
+
+    def test_columns_make_room_for_each_other(self):
+        first = dict(read_recording(self.csv).columns)
+        with mock.patch("fingertip.columns._KEPT_bytes", 0):
+            again = read_recording(self.csv)
+            for name in (*first, *first):
+                self.assertEqual(again[name].tobytes(), first[name].tobytes(), name)
+            held, gone = again["x_mm"], weakref.ref(again["y_mm"])
+            self.assertIs(again["x_mm"], held)
+            self.assertIsNone(gone(), "the memory of a column that no one holds")
 
     def test_a_quoted_note_keeps_its_end(self):
         path = self.folder / "quoted.csv"
