@@ -16,7 +16,7 @@
  * except for the drift of the calm before it (calm.h), for an hour.
  * - Taken again: a reading below what a release explains means that the level was taken under a press. The sensor is
  * tared again after ZERO_BELOW_s, or after half a second if it is far below. Rubber that bulged beside that press may be above its zero
- * then, and looks like a contact: where a sensor is below by more than eight times what any is above, all are tared again.
+ * then, which seems to be a contact: where a sensor is below by more than eight times what any is above, all are tared again.
  *
  * Remainder: what rubber keeps of a press, which cannot be distinguished from a remaining force.
  * - Each sensor remembers its strongest press; the memory fades in 20 s. Three quarters of the pad's strongest
