@@ -9,9 +9,10 @@
 #endif
 
 /* Stack of the main loop and the interrupts of a board's image, in bytes: what is reserved, and what any scene may use
- * at most. The checks of the images prove both by the call graph (tests/checks). */
+ * at most, by the array's sensors. The checks of the images prove both by the call graph (tests/checks), and the report on
+ * pads for arrays that no board has. */
 #define FT_STACK_RESERVED_bytes 4096
-#define FT_STACK_USED_MAX_bytes 2608
+#define FT_STACK_USED_MAX_bytes(sensors) ((sensors) > 15 ? 3584 : 2608)
 
 /* Of any air in which a hand works: sea level in a storm is 108 kPa, 9 km up 30 kPa. */
 #define FT_AIR_MIN_Pa 30000

@@ -5,6 +5,7 @@ pads.py --build build/host -o build/report    writes pads.json and pads.md
 """
 
 import pathlib
+import re
 import sys
 import tempfile
 
@@ -20,6 +21,7 @@ from presentation import judge  # noqa: E402
 from reporting import Steps, built, option_parser, output_folder, publish  # noqa: E402
 
 NOISE_Pa, ITERATIONS = 5.0, 7
+STACK_MAX_bytes = int(re.search(r"> \d+ \? (\d+)", (ROOT / "firmware/common/limits.h").read_text(encoding="utf-8")).group(1))
 OBSERVABLE = [*map(arrays.size_of, arrays.RECTANGLES[1:]), (6, 5)]
 
 
@@ -42,9 +44,10 @@ def main(argv):
     options, seed, count = option_parser(__doc__).parse_args(argv), 11, 10000
     out, measure, random = output_folder(options), Measure(options.build), np.random.default_rng(seed)
     found = {f"p99_9_um_{columns}x{rows}": p99_9_um(measure, columns, rows, count, random) for columns, rows in OBSERVABLE}
-    goals = [(name, "<=", 1) for name in found] + [("pads_built", ">=", 8)]
+    goals = [(name, "<=", 1) for name in found] + [("pads_built", ">=", 8), ("stack_bytes_max", "<=", STACK_MAX_bytes)]
     with tempfile.TemporaryDirectory() as folder:
         rows, pads = arrays.measure(folder, built(options.build, "tests/support/command_frame"), Steps())
+    found["stack_bytes_max"] = max(row["stack_bytes"] for row in rows)
     found = judge(found | {"pads_built": len(pads)}, goals) | {"pads": pads, "arrays": rows, "presses": count, "seed": seed}
     return publish(found, options, "pads", {})
 

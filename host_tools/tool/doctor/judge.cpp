@@ -45,7 +45,6 @@ constexpr double DRIFT_SECONDS_MIN = 8;
 /* The formulas of the family differ by powers of two and by what a count is (sensors.h). The formula
  * of one sensor turns another's codes into this multiple of the pressure, or this fraction. */
 constexpr double OF_ANOTHER_TYPE = 20;
-constexpr unsigned STACK_FREE_MIN_bytes = FT_STACK_RESERVED_bytes - FT_STACK_USED_MAX_bytes;
 constexpr unsigned BUSY_MAX_permille = 950;
 
 std::string list(const std::vector<unsigned> &sensors) {
@@ -374,7 +373,8 @@ private:
       add(Verdict::bad, "processor", "the second one does not run: the first does its work, at fewer frames a second",
           "power it off and on; if it stays, replace the Pico");
     }
-    bool deep = is_known ? now.stack_free_bytes < STACK_FREE_MIN_bytes : now.stack_free_bytes == 0;
+    const unsigned free_min_bytes = is_known ? FT_STACK_RESERVED_bytes - FT_STACK_USED_MAX_bytes(wiring_->sensor_count) : 1;
+    bool deep = now.stack_free_bytes < free_min_bytes;
     add(now.stack_free_bytes == 0 ? Verdict::bad
         : deep                    ? Verdict::warn
                                   : Verdict::ok,
