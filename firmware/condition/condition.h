@@ -27,8 +27,8 @@
  * - A long contact leaves a drift too, as far as a barometer may have drifted in it.
  *
  * Past: what rubber keeps shows at rest, and goes on for 1 to 4 s in the next contact.
- * - So what the zero is off at a touch from where it comes to rest fades in the contact, with PAST_ms. Where it comes
- * to rest: where it was before, within PAST_SDS of what may be kept.
+ * - So what the zero is off at a touch from where it comes to rest fades in the contact, with PAST_ms. A sensor at rest
+ * reads where it comes to rest, and the share of the past that it keeps: both are learnt together (ZERO.md).
  * - Its amount is uncertain, and so is what a hold itself changes in this sensor alone. past_sd_Pa_q10 is the sd of
  * both: a share of what the sensor has measured, which rises in a hold and by all that it lets go of, after a contact
  * or where one moves on, and fades with PAST_ms. The share is learnt from what is left after each contact, as a size and with its sign.
@@ -72,15 +72,15 @@ struct gate {
 /* All that is remembered of one sensor. */
 struct condition_sensor {
   int32_t level_Pa_q10;
-  int32_t rests_Pa_q10;   /* where the zero goes in a contact, once what rubber keeps has faded */
-  int32_t spread_Pa_q10;  /* 0: settled */
-  int32_t memory_Pa_q10;  /* strongest press, fading */
-  int32_t reached_Pa_q10; /* the same of this contact alone */
-  int32_t past_Pa_q10;    /* what rubber may keep: rises in a hold, and by all that is let go; fades in 3 s */
-  int32_t past_share;     /* sd of that, 1 / 2^16: learnt from what is left after contacts */
-  int32_t keeps_share;    /* mean, of either sign, learnt as that is */
-  int32_t let_go_Pa_q10;  /* sum of sudden falls in this contact, as where it slides on; fades in 3 s */
-  int32_t kept_Pa_q10;    /* let_go times keeps_share, which faded_Pa_q10 is less by */
+  int32_t rests_Pa_q10;        /* where the zero goes in a contact, once what rubber keeps has faded */
+  int32_t spread_Pa_q10;       /* 0: settled */
+  int32_t memory_Pa_q10;       /* strongest press, fading */
+  int32_t reached_Pa_q10;      /* the same of this contact alone */
+  int32_t past_Pa_q10;         /* what rubber may keep: rises in a hold, and by all that is let go; fades in 3 s */
+  int32_t past_share;          /* sd of that, 1 / 2^16: learnt from what is left after contacts */
+  int32_t keeps_share, learnt; /* mean, of either sign, of as many releases, KEEPS_LEARNT_MOST at most */
+  int32_t let_go_Pa_q10;       /* sum of sudden falls in this contact, as where it slides on; fades in 3 s */
+  int32_t kept_Pa_q10;         /* let_go times keeps_share, which faded_Pa_q10 is less by */
   int32_t wander_Pa_q10;
   int32_t taken_Pa_q10;
   int32_t crept_Pa_q10;   /* risen slowly */

@@ -65,9 +65,9 @@
 #define PAST_SHARE_FORCE 3277             /* a twentieth: twice the sd that it shows is the band of all, an eighth */
 #define PAST_SHOWS_ms ((uint32_t)MS(200)) /* after a contact; the remainder follows in 100 ms */
 #define PAST_LEAST_Pa 1000                /* less shows nothing beside noise and drift */
-#define PAST_SDS 2                        /* the zero is within as many of where it comes to rest; twin, seeds 21 to 24 */
+#define PAST_HIDES_Pa 32                  /* of more the zero has too much for a sensor to rest there; choice */
 #define PAST_LEARN_SHIFT 2                /* a quarter of what each release shows; choice */
-#define KEEPS_LEARN_SHIFT 1               /* and a half of its mean; twin, seeds 101 to 110 */
+#define KEEPS_LEARNT_MOST 16              /* releases in the mean of what it keeps; twin, seeds 101 to 104 */
 #define SUDDEN_SHIFT 6                    /* a fall by a 64th of the press between two updates is the contact's, not the rubber's */
 #define CROSS_SHIFT 2                     /* all but a quarter of the strongest memory counts for all; strips, ZERO.md */
 #define FRESH_ms ((uint32_t)SECONDS(2))   /* after a contact: a remainder may rise */

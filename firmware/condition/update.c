@@ -35,7 +35,6 @@ static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q
   return of_Pa_q10 >> BAND_SHIFT;
 }
 static void follow_past(const struct step *step) { (void)step; }
-static void learn_past(const struct step *step, int32_t above_level_Pa_q10) { (void)step, (void)above_level_Pa_q10; }
 static void forget_past(struct condition_sensor *sensor) { (void)sensor; }
 static void follow_rest(const struct step *step) { step->sensor->rests_Pa_q10 = step->sensor->level_Pa_q10; }
 void update_past_shows(struct condition *condition, uint8_t count) { (void)condition, (void)count; }
@@ -75,37 +74,39 @@ static bool is_left_by_force(const struct condition *condition, sensor_map usabl
 }
 
 /* What is left after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd. */
-static void learn_past(const struct step *step, int32_t above_level_Pa_q10) {
+static void learn_past(const struct step *step, int32_t keeps_Pa_q10) {
   struct condition_sensor *sensor = step->sensor;
-  const sensor_map bit = sensor_bit(step->k);
-  if (!(step->condition->to_learn & bit) || step->condition->gate.released_ms < PAST_SHOWS_ms) {
-    return;
-  }
-  step->condition->to_learn &= ~bit;
+  step->condition->to_learn &= ~sensor_bit(step->k);
   const bool shows = sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa) && step->condition->gate.released_ms < FRESH_ms;
   if (shows && !is_left_by_force(step->condition, step->usable)) {
-    const int32_t most = part_of(sensor->past_Pa_q10, PAST_SHARE_MOST);
-    const int32_t off = clamp(size_of(above_level_Pa_q10) - step->condition->drifted_Pa_q10, 0, most);
-    const int32_t shown = port_divide(off + off / 4, sensor->past_Pa_q10 >> 16);
+    const int32_t most = part_of(sensor->past_Pa_q10, PAST_SHARE_MOST), past = sensor->past_Pa_q10 >> 16;
+    const int32_t above_level = keeps_Pa_q10 + sensor->rests_Pa_q10 - sensor->level_Pa_q10, drifted = step->condition->drifted_Pa_q10;
+    const int32_t off = clamp(size_of(above_level) - drifted, 0, most), shown = port_divide(off + off / 4, past);
     sensor->past_share = larger(sensor->past_share + ((shown - sensor->past_share) >> PAST_LEARN_SHIFT), PAST_SHARE_LEAST);
-    const int32_t keeps = clamp(above_level_Pa_q10 + sensor->level_Pa_q10 - sensor->rests_Pa_q10, -most, most);
-    sensor->keeps_share += (port_divide(keeps, sensor->past_Pa_q10 >> 16) - sensor->keeps_share) >> KEEPS_LEARN_SHIFT;
+    sensor->learnt += sensor->learnt < KEEPS_LEARNT_MOST;
+    sensor->keeps_share += port_divide(port_divide(clamp(keeps_Pa_q10, -most, most), past) - sensor->keeps_share, sensor->learnt);
+  }
+}
+
+/* While nothing touches, a sensor reads where it comes to rest and the share that it keeps of what is past. The former drifts, and is the
+ * zero once little is past. */
+static void follow_rest(const struct step *step) {
+  struct condition_sensor *sensor = step->sensor;
+  const int32_t zero = step->condition->zero_Pa_q10[step->k], keeps = step->above_Pa_q10 + zero - sensor->rests_Pa_q10;
+  if (step->condition->gate.released_ms >= PAST_SHOWS_ms) {
+    if (step->condition->to_learn >> step->k & 1u) {
+      learn_past(step, keeps);
+    }
+    const int32_t off = keeps - ((sensor->past_Pa_q10 >> 10) * sensor->keeps_share >> 6);
+    const int32_t most = step->ms >> SLEW_SHIFT, past = sensor->past_Pa_q10 / Pa_q10(PAST_HIDES_Pa);
+    sensor->rests_Pa_q10 += clamp(part_of(off, share_in(step->ms, FOLLOW_ms)), -most, most);
+    sensor->rests_Pa_q10 += port_divide(zero - sensor->rests_Pa_q10, 1 + past * past);
   }
 }
 
 static void forget_past(struct condition_sensor *sensor) {
   sensor->past_Pa_q10 = 0;
   sensor->past_share = larger(sensor->past_share, PAST_SHARE);
-}
-
-/* The level takes over what rubber keeps, and sooner upwards. So where the zero comes to rest is where it was, within
- * what may be kept; after a contact not before this has been learnt from it. */
-static void follow_rest(const struct step *step) {
-  if (!(step->condition->to_learn >> step->k & 1u)) {
-    const int32_t zero = step->condition->zero_Pa_q10[step->k];
-    const int32_t keeps = PAST_SDS * step->condition->past_sd_Pa_q10[step->k];
-    step->sensor->rests_Pa_q10 = clamp(step->sensor->rests_Pa_q10, zero - keeps, zero + keeps);
-  }
 }
 
 void update_past_shows(struct condition *condition, uint8_t count) {
@@ -226,7 +227,6 @@ static void set_zero(const struct step *step, int32_t remainder_Pa_q10, int32_t 
   struct condition_sensor *sensor = step->sensor;
   const int32_t spread = sensor->spread_Pa_q10;
   condition->zero_Pa_q10[step->k] = sensor->level_Pa_q10 + remainder_Pa_q10;
-  follow_rest(step);
   sensor->wander_Pa_q10 = faded(sensor->wander_Pa_q10, step->wander_share) + level_moved_Pa_q10;
   sensor->taken_Pa_q10 = faded(sensor->taken_Pa_q10, step->wander_share) + moved_Pa_q10;
   sensor->crept_Pa_q10 = spread > 0 ? 0 : sensor->crept_Pa_q10;
@@ -250,6 +250,7 @@ static bool settle(const struct step *step) {
   const bool settled = spread < Pa_q10(SETTLED_Pa) + step->noise_Pa_q10 || condition->now_ms - sensor->tare_begun_ms > SETTLE_LONGEST_ms;
   sensor->spread_Pa_q10 = settled ? 0 : spread;
   set_zero(step, 0, 0, 0);
+  follow_rest(step);
   condition->margin_Pa_q10[step->k] = sensor->spread_Pa_q10;
   set_bit(&condition->restless, step->k, true);
   set_bit(&condition->below, step->k, false);
@@ -341,11 +342,12 @@ static void follow(const struct step *step) {
   int32_t remainder = before - sensor->level_Pa_q10;
   const int32_t above_level = step->above_Pa_q10 + remainder;
   if (!unsure) {
-    learn_past(step, above_level);
+    follow_rest(step);
     remainder = follow_remainder(step, &band, fresh, remainder);
   }
   const struct band none = {0};
   const int32_t level_moved = follow_level(step, unsure ? &none : &band, !unsure, &remainder);
+  sensor->rests_Pa_q10 += unsure ? level_moved : 0;
   set_zero(step, remainder, level_moved, sensor->level_Pa_q10 + remainder - before);
   condition->margin_Pa_q10[step->k] = (unsure ? 0 : band.margin_Pa_q10) + sensor->spread_Pa_q10;
   set_bit(&condition->restless, step->k, size_of(above_level) > Pa_q10(CALM_LAG_Pa) + step->noise_Pa_q10 / 2);

@@ -97,8 +97,8 @@ static uint32_t course(void) {
 }
 
 TEST(test_frames_are_conditioned_the_same_to_the_bit) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0xA9AB4548, 0xB4EDED8B, 0xC3B5D0FB, 0xA74CC0BE,
-                                                 0x56D42A74, 0x00084507, 0x613E0BA9, 0xA9347955};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x0AD3A479, 0xB2E0909A, 0x0988D7CF, 0xF6E356C1,
+                                                 0x7C2B3DD4, 0xA9A6B202, 0x55423B48, 0x21CF6842};
   uint32_t found[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x7A65726F));
   for (int i = 0; i < COURSES; i++) {
