@@ -1,11 +1,15 @@
-"""What a user without a fingertip meets: `fingertip simulate`, the README's example, and a release built twice."""
+"""What a user without a fingertip meets: `fingertip simulate`, the README's example, a release built twice, and
+README's commands on an empty Debian."""
 
 # real time: how long things take
 import json
 import os
 import pathlib
+import re
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 
 from nightly import ROOT, Programs, job, run
@@ -71,3 +75,32 @@ def release(_):
         raise InputError("a commit was made between the two releases; run again")
     differ = sorted(name for name in found[0].keys() | found[1].keys() if found[0].get(name) != found[1].get(name))
     return {"release_differs": len(differ), "release_files": len(found[0]), "release_that_differ": differ}
+
+
+def seconds_in(system, command):
+    """How long a command takes in the project's folder of another system."""
+    mounts = "".join(f"mount --rbind /{folder} {system}/{folder} && " for folder in ("proc", "sys", "dev"))
+    begun_s = time.monotonic()
+    run("unshare", "--mount", "sh", "-c", f"{mounts} exec chroot {system} sh -c 'cd /fingertip && {command}'")
+    return time.monotonic() - begun_s
+
+
+@job("newcomer", ("minutes_from_nothing", "<=", 20), ("demo_minutes_from_nothing", "<=", 4), ("quick_after_change_s", "<=", 60))
+def from_nothing(_):
+    """README's two commands on an empty Debian 12, installation and downloads included, and the quick tests after a change of one line of the fit."""
+    if os.geteuid() != 0 or not shutil.which("debootstrap"):
+        raise InputError("an empty Debian needs root and debootstrap")
+    mirror = re.search(r"https?://\S+", run("apt-get", "indextargets", "--format", "$(REPO_URI)"))[0]
+    with tempfile.TemporaryDirectory(prefix="nightly-", dir=ROOT / "build") as folder:
+        systems = [os.path.join(folder, name) for name in ("test", "demo")]
+        run("debootstrap", "--variant=minbase", "--include=ca-certificates", "bookworm", systems[0], mirror)
+        run("git", "clone", "--quiet", ROOT, f"{systems[0]}/fingertip")
+        for path in ("/etc/resolv.conf", "/etc/pip.conf", "/root/.npmrc"):
+            if os.path.exists(path):
+                shutil.copy(path, systems[0] + path)
+        shutil.copytree("/etc/apt", f"{systems[0]}/etc/apt", dirs_exist_ok=True)
+        run("cp", "-a", *systems)
+        demo_s = seconds_in(systems[1], "sh cmake/bootstrap.sh demo")
+        test_s = seconds_in(systems[0], "sh cmake/bootstrap.sh test")
+        quick_s = seconds_in(systems[0], "echo >> firmware/fit/fit_grid.c && sh cmake/bootstrap.sh test quick")
+    return {"minutes_from_nothing": test_s / 60, "demo_minutes_from_nothing": demo_s / 60, "quick_after_change_s": quick_s}
