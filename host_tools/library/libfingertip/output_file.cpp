@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <filesystem>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -19,6 +20,15 @@ namespace fs = std::filesystem;
   case EEXIST: throw Error(ErrorCode::file_exists, path + ": exists already");
   case EISDIR: throw Error(ErrorCode::is_folder, path + ": is a folder");
   default: throw Error(ErrorCode::cannot_write, path + ": " + std::strerror(error));
+  }
+}
+
+/* While an OutputFile grows it is locked: two recorders would mix their lines. */
+static void fail_if_recorded(const std::string &path, int fd) {
+  struct stat status;
+  if (fd >= 0 && fstat(fd, &status) == 0 && S_ISREG(status.st_mode) && flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    close(fd);
+    throw Error(ErrorCode::cannot_write, path + ": is being recorded");
   }
 }
 
@@ -62,6 +72,9 @@ OutputFile::OutputFile(const std::string &path, bool replace, Appears appears)
   struct stat old;
   bool exists = stat(path.c_str(), &old) == 0;
   if (appears == Appears::when_finished && (!exists || S_ISREG(old.st_mode))) {
+    const int replaced = exists ? open(path.c_str(), O_RDONLY | O_CLOEXEC) : -1;
+    fail_if_recorded(path, replaced);
+    close(replaced);
     temporary_ = target_ + ".XXXXXX";
     fd_ = mkostemp(temporary_.data(), O_CLOEXEC);
     if (fd_ >= 0) {
@@ -70,7 +83,12 @@ OutputFile::OutputFile(const std::string &path, bool replace, Appears appears)
       fchmod(fd_, exists ? old.st_mode & 07777 : 0666 & ~mask);
     }
   } else {
-    fd_ = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (replace ? O_TRUNC : O_EXCL), 0666);
+    fd_ = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (replace ? 0 : O_EXCL), 0666);
+    fail_if_recorded(path, fd_);
+    if (exists && S_ISREG(old.st_mode) && fd_ >= 0 && ftruncate(fd_, 0) != 0) {
+      close(fd_);
+      fd_ = -1;
+    }
   }
   if (fd_ < 0) {
     fail(path, errno);

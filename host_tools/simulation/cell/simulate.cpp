@@ -86,7 +86,7 @@ int main(int argc, char **argv) {
   std::vector<CLI::Option *> of_lift;
   const auto for_lift = [&](CLI::Option *option) { return of_lift.emplace_back(option); };
   const auto lift_number = [&](const char *name, double &value, const char *unit, double low, double high, const char *help) {
-    return for_lift(add(name, value, unit, help)->check(CLI::Range(low, high))->capture_default_str());
+    return for_lift(add(name, value, unit, help)->check(within(low, high))->capture_default_str());
   };
 
   CLI::Option *press_flag = app.add_flag(
@@ -108,19 +108,19 @@ int main(int argc, char **argv) {
   add("--pull", options.pull_g, "GRAMS",
       "The hand of --validate pulls a thread in the end, with this weight, for `fingertip validate --pull`")
       ->needs(validate_flag)
-      ->check(CLI::Range(10.0, 1000.0));
+      ->check(within(10.0, 1000.0));
   add("--ports", options.ports, "FOLDER",
       "Folder for the ports left, right and gripper, which FINGERTIP_PORT may name; no program finds the fingertips by itself then, and "
       "one at a time may use each");
-  add("--seed", options.seed, "N", "Of gains, noise and places; default 1");
+  add("--seed", options.seed, "N", "Of gains, noise and places; default 1")->check(CLI::Range(0, 999999999));
   add("--gain-spread", options.gain_spread, "SHARE", "Standard deviation between sensors; default 0.1, with --lift 0.05")
-      ->check(CLI::Range(0.0, 0.2));
-  add("--seconds", options.seconds, "S", "End after this time")->check(CLI::Range(0.1, 1e6));
+      ->check(within(0.0, 0.2));
+  add("--seconds", options.seconds, "S", "End after this time")->check(within(0.1, 1e6));
   add("--truth", options.truth, "FILE.csv", "Keeps what is true");
   app.add_flag("--overwrite", options.overwrite, "Replace FILE.csv if it exists");
   add("--cache", options.cache, "FOLDER", "Of contact tables; default: those installed, else ~/.cache/fingertip");
   for (CLI::Option *option : {add("--fingertips", options.press.fingertips, "N", "How many")->check(CLI::Range(1, 2)),
-                              add("--weight", options.press.weight_g, "GRAMS", "What is set down")->check(CLI::Range(20.0, 2000.0))}) {
+                              add("--weight", options.press.weight_g, "GRAMS", "What is set down")->check(within(20.0, 2000.0))}) {
     option->excludes(lift_flag)->group("Presses")->capture_default_str();
   }
 
@@ -138,8 +138,8 @@ int main(int argc, char **argv) {
   lift_number("--friction", friction, "NUMBER", 0.05, 3.0, "Its friction coefficient");
   lift_number("--kinetic", object.kinetic_share, "SHARE", 0.3, 1.0, "Of the friction, while it slides");
   const CLI::Option *stiffness =
-      for_lift(add("--stiffness", object.stiffness_N_mm, "N/MM", "Its stiffness; default: it does not yield"))->check(CLI::Range(0.1, 1e6));
-  for_lift(add("--crushes", object.crushes_N, "N", "More force breaks it; default: none does"))->check(CLI::Range(0.1, 1e6));
+      for_lift(add("--stiffness", object.stiffness_N_mm, "N/MM", "Its stiffness; default: it does not yield"))->check(within(0.1, 1e6));
+  for_lift(add("--crushes", object.crushes_N, "N", "More force breaks it; default: none does"))->check(within(0.1, 1e6));
   lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0, "How much wider than the object the gripper is at first");
   lift_number("--height", object.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
   lift_number("--lift-time", object.lift_s, "S", 0.05, 60.0, "And how long that takes");

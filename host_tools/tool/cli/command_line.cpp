@@ -89,6 +89,12 @@ int CommandLine::run(int argc, char **argv) {
   } catch (const CLI::ParseError &error) {
     return app_.exit(error) == 0 ? 0 : 2;
   }
+  for (const CLI::Option *option : app_.get_subcommands().front()->get_options()) {
+    const auto given = option->results();
+    if (std::find(given.begin(), given.end(), "") != given.end()) {
+      throw WrongUsage(option->get_name() + " takes a text, and this one is empty; see fingertip --help");
+    }
+  }
   catch_signals();
   return chosen_();
 }

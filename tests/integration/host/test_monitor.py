@@ -172,6 +172,11 @@ class Monitor(CliTest):
             r"(?m)^\d\.\d s  \d+ frames .* force 5\.00 N  CONTACT FIT_VALID UNCERTAINTY_VALID SLIP_VALID TARED WIDTHS_VALID "
             r"TANGENTIAL_VALID VELOCITY_VALID SHAPE_VALID EDGE$",
         )
+        with self.device():
+            monitor = self.start("monitor", "--port", self.port)
+            monitor.readline()
+            monitor.stdout.close()  # as head does
+            self.world.until(lambda: monitor.poll() is not None)
 
 
 if __name__ == "__main__":

@@ -79,6 +79,16 @@ TEST(OutputFile, WhatCannotBeWrittenIsRefusedAndTouchesNothing) {
   EXPECT_EQ(files_in(folder.path()), 1);
 }
 
+TEST(OutputFile, OneThatGrowsIsNotReplaced) {
+  test::TemporaryFolder folder;
+  OutputFile first(folder / "a", false, OutputFile::Appears::at_once);
+  first.append("line", 4);
+  for (auto appears : {OutputFile::Appears::at_once, WHEN_FINISHED}) {
+    EXPECT_THROW(OutputFile(folder / "a", true, appears), Error);
+  }
+  EXPECT_EQ(test::contents(folder / "a"), "line");
+}
+
 TEST(OutputFile, OneFileByTwoNames) {
   test::TemporaryFolder folder;
   write(folder / "a", "");

@@ -188,10 +188,10 @@ int run(int argc, char **argv) {
   app.add_flag("--known-pad", options.knows_pad, "The calibration set the pad's profile, so that pulls are estimated")->needs(calibrated);
   app.add_flag("--plain", options.plain, "Rubber as its profile has it: sensors' gains differ, and nothing else");
   app.add_option("--pull", options.pad.pulling.weight_g, "Mass on a thread that pulls at the end")
-      ->check(CLI::Range(10.0, 1000.0))
+      ->check(within(10.0, 1000.0))
       ->type_name("GRAMS");
   app.add_option("--thread-height", options.pad.pulling.height_mm, "Of the thread above the rubber")
-      ->check(CLI::Range(0.0, 10.0))
+      ->check(within(0.0, 10.0))
       ->type_name("MM")
       ->capture_default_str();
   app.add_option("--cache", options.pad.cache, "Of contact tables")->type_name("FOLDER");

@@ -77,7 +77,7 @@ std::optional<Way> way_of(const std::string &text, Reach reach) {
   if (text.empty()) {
     return std::nullopt;
   }
-  bool is_port = text.find('/') != std::string::npos;
+  bool is_port = text.find('/') != std::string::npos || text.rfind("sim:", 0) == 0;
   return choose_way({is_port ? text : "", is_port ? "" : text, reach});
 }
 

@@ -206,7 +206,7 @@ private:
     if (options_.until_gone && any_gone_) {
       return "gone";
     }
-    if (stop_requested() || quit_ || (to_standard_output_ && !is_standard_output_read())) {
+    if (stop_requested() || quit_ || ((to_standard_output_ || options_.monitor) && !is_standard_output_read())) {
       return "interrupted";
     }
     if (begun_ && options_.seconds && models_[0].frames() > 0 && seconds() >= *options_.seconds) {
@@ -432,7 +432,8 @@ CLI::App *add(CommandLine &line, const std::string &name, const std::string &hel
       ->expected(1)
       ->type_name("SERIAL");
   with_port_only(command, options->choice);
-  command->add_flag("--all", options->all, "Every fingertip there is, on one clock");
+  command->add_flag("--all", options->all, "Every fingertip there is, on one clock")
+      ->excludes(command->get_option("--device"), command->get_option("--port"));
   with_seconds(command, options->seconds, "End after this much device time");
   with_value(command, "FILE.ftr", "--raw-bytes", options->raw_bytes, "Also keep the bytes of the line as they came");
   command->add_flag("--overwrite", options->overwrite, "Replace files that exist");

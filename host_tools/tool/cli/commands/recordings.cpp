@@ -262,7 +262,7 @@ int show(const ReplayOptions &options) {
   Playback playback(options.file, options.salvage, options.device, options.speed, options.interval);
   std::string name = printable(options.file);
   std::unique_ptr<View> view = playback.grip() ? make_grasp_view(options.colour, *playback.grip()) : make_monitor_view(options.colour);
-  while (!playback.is_over() && !stop_requested()) {
+  while (!playback.is_over() && !stop_requested() && is_standard_output_read()) {
     playback.step(host_now());
     view->update(playback.models(), playback.caption(name));
     while (auto key = view->key()) {
