@@ -180,6 +180,7 @@ class Errors:
             "cover_2sd_percent": percent(error <= 2 * self.sd_mm[inside]),
             "warned_percent": percent(warned),
             "silent_percent": percent((error > 1.0) & ~warned),
+            "silent_by_sd": 1 - np.prod(-np.expm1(-1 / np.maximum(self.sd_mm[inside][~warned], 1e-6) ** 2)),  # were it exact
             "force_scatter_percent": 100 * float(np.nanstd(np.log(np.maximum(self.force_N[inside], 1e-9)))),
             "outside_p50_mm": quantile(self.error_mm[outside], 0.5),
         }

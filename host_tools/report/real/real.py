@@ -97,14 +97,13 @@ def judge_grid(measure, one, path):
     calibrated = [grids.Errors(fingertip.fit(readings, one.response), xy) for one in solved]
     missing = [grids.Errors(fingertip.fit(torn, one.response), torn_xy) for one in solved]
     shipped, raw = (grids.Errors(fingertip.fit(readings, known), xy) for known in (None, set_by_hand))
-    accepted = [one for one in calibrations if one.good]
     guided = fingertip.guided(grid, SEED)
-    worse = np.zeros(3, int)  # sessions whose median, 95th percentile, silent presses are more than those of the pad as shipped
+    worse = np.zeros(4)  # sessions whose median, 95th percentile, silent presses are more than as shipped; with any silent by their sds
     after = {}
     for way, several in (("random", calibrations), ("rows", in_rows), ("guided", guided)):
         errors = [grids.Errors(fingertip.fit(readings, one.response), xy).figures(inside, outside) for one in several if one.good]
         for each in errors:
-            worse += [each[name] > shipped.figures(inside, outside)[name] for name in COMPARED]
+            worse += [*(each[name] > shipped.figures(inside, outside)[name] for name in COMPARED), each["silent_by_sd"]]
         after[way] = [100 * len(errors) / len(several), *(mean_of(errors, name) for name in COMPARED)]
     found = {
         "recording": one["key"],
@@ -116,12 +115,12 @@ def judge_grid(measure, one, path):
         "shipped": shipped.figures(inside, outside),
         "raw": raw.figures(inside, outside),
         "sessions": len(calibrations),
-        "accepted": len(accepted),
+        "accepted": sum(one.good for one in calibrations),
         "reasons": sorted({one.found["reason"].decode() for one in calibrations} - {"none"}),
         "rows_accepted": sum(one.good for one in in_rows),
         "accepted_percent_p50_p95_mm_silent_percent": after,
         "width_found_mm": grids.quantile([one.found["width_mm"] for one in solved], 0.5),
-        "worse_median_p95_silent": worse.tolist(),
+        "worse_median_p95_silent_by_sd": worse.tolist(),
     }
     if calibrated:
         figures = [each.figures(inside, outside) for each in calibrated]
@@ -133,7 +132,7 @@ def judge_grid(measure, one, path):
         "shipped": shipped,
         "raw": raw,
         "calibrated": calibrated[0] if calibrated else None,
-        "to_pace": [(fingertip, readings[inside], xy[inside], one) for one in accepted],
+        "to_pace": [(fingertip, readings[inside], xy[inside], one) for one in calibrations if one.good],
     }
     return found, shown
 
@@ -162,9 +161,8 @@ def judge_grids(measure, source, here):
     figures["cal_cover_1sd_most_percent"] = figures["cal_cover_1sd_percent"]
     for name, accepted in (("sessions_accepted_percent", "accepted"), ("rows_accepted_percent", "rows_accepted")):
         figures[name] = 100 * sum(row[accepted] for row in rows) / sum(row["sessions"] for row in rows) if rows else None
-    # Of all grids.
-    worse = np.sum([row["worse_median_p95_silent"] for row in found], axis=0).tolist() if found else [None] * 3
-    figures |= dict(zip(("worse_median_after_accept", "worse_p95_after_accept", "worse_silent_after_accept"), worse))
+    worse = np.sum([row["worse_median_p95_silent_by_sd"] for row in found], axis=0).tolist() if found else [None] * 4
+    figures |= dict(zip((*(f"worse_{what}_after_accept" for what in ("median", "p95", "silent")), "silent_after_accept_by_sd"), worse))
     figures["one_missing_over_1mm_percent"] = mean_of(rows, "one_missing_over_1mm_percent")
     return {**figures, "grids": found}, shown
 

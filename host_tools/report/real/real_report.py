@@ -26,7 +26,6 @@ def draw_profile(axes, shown):
         title="Response: the dip three to five widths away",
         xlabel="distance / width",
         ylabel="% of the peak, symmetric log",
-        yscale="symlog",
     )
     axes.set_yscale("symlog", linthresh=5)
     axes.legend(fontsize=7)
