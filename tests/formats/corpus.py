@@ -142,6 +142,8 @@ def csv_cases(corpus, name, text, devices):
     add("torn_blank", text + b"  ")
     add("blank_lines", [*lines[:row], "", " \t", *lines[row:]])
     add("blank_line_first", ["", *lines])
+    add("indented", ["  " + line for line in lines], f"{name}_whole")
+    add("indented_rows", ["\t" * line[:1].isdigit() + line for line in lines], f"{name}_whole")
     add("byte_order_mark", b"\xef\xbb\xbf" + text)
     for what, cell in {"semicolons": "{};", "tabs": "{}\t", "quotes": '"{}",', "blanks": " {} ,", "decimal_commas": "{};"}.items():
         rows = [[each.replace(".", "," if "comma" in what else ".") for each in line.split(",")] for line in lines]
@@ -439,6 +441,7 @@ def bag_cases(corpus, name, content, devices, chances):
             add(f"chunk_{number}_field_{field}", content[:at] + data + content[at + len(data) :])
     add("magic_only", content[:8])
     add("half_a_magic", content[:5])
+    add("copied_as_text", content.replace(b"\n", b"\r\n"))
     for behind in (b"hello", content):
         add(f"{len(behind)}_bytes_behind", content + behind)
     add("no_footer", content[: chunks[-1].chunk_start_offset + chunks[-1].chunk_length + chunks[-1].message_index_length])

@@ -25,6 +25,7 @@ class Spreadsheet {
 public:
   void restore(LineSource::Line &line) {
     std::string &text = line.text;
+    text.erase(0, std::min(text.find_first_not_of(" \t"), text.size()));
     const bool is_quoted = text.rfind("\"#", 0) == 0;
     std::size_t end = is_quoted; /* of the quotes */
     std::string quoted;
@@ -250,6 +251,7 @@ void refuse_others(const std::string &path, std::string_view start) {
       {"\xfd"
        "7zXZ",
        "packed as a whole by xz: unxz FILE"},
+      {"\x89MCAP0", "an MCAP file that was copied as text; copy it again, as bytes"},
       {"PK\3\4", "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV"},
       {"SQLite format 3", "a bag of ROS 2 in SQLite; ros2 bag convert makes one in MCAP, packed as it is now"},
       {"\xff\xfe", UTF_16},

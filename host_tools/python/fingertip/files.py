@@ -291,6 +291,7 @@ _OTHERS = {
     b"\x1f\x8b\x08": "packed as a whole by gzip: gunzip FILE",
     b"BZh": "packed as a whole by bzip2: bunzip2 FILE",
     b"\xfd7zXZ": "packed as a whole by xz: unxz FILE",
+    b"\x89MCAP0": "an MCAP file that was copied as text; copy it again, as bytes",
     b"PK\3\4": "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV",
     b"SQLite format 3": "a bag of ROS 2 in SQLite; ros2 bag convert makes one in MCAP, packed as it is now",
     **dict.fromkeys((b"\xff\xfe", b"\xfe\xff", b"#\0", b"\0#"), "text in UTF-16, an editor's or a spreadsheet's; save it as UTF-8"),
@@ -364,7 +365,7 @@ class _RecordingLines:
                             yield Stretch(range(number + at, number + other), block[begins[at] : begins[other]])
                         if other < len(is_row):
                             text = block[begins[other] : begins[other + 1]].decode("utf-8", "surrogateescape")
-                            yield number + other, text.removesuffix("\n"), torn and other + 1 == len(is_row)
+                            yield number + other, text.removesuffix("\n").lstrip(" \t"), torn and other + 1 == len(is_row)
                         at = other + 1
                     number += len(is_row)
         except OSError as error:

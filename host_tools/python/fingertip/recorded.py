@@ -48,7 +48,7 @@ JOINT_COLUMNS = "device,time_us,"
 UNKNOWN_HEADER = "unknown header: columns moved, renamed, missing, or added?"
 # A first line, a comment or a header, as spreadsheets save it.
 OF_SPREADSHEETS = re.compile(
-    rb'\A(?:\xef\xbb\xbf)?(?:"|[^\r\n]*[;,\t][\r\n])|^"#|^"?(?:t_us|device)(?:[^\r\n]*[;\t" ]|[^\r\n]*,[\r\n])', re.M
+    rb'\A(?:\xef\xbb\xbf)?(?:"|[^\r\n]*[;,\t][\r\n])|^"#|^[ \t"]*(?:t_us|device)(?:[^\r\n]*[;\t" ]|[^\r\n]*,[\r\n])', re.M
 )
 
 
@@ -63,7 +63,7 @@ def restored(lines: Iterable[str]) -> Iterator[str]:
     """Lines as they were before a spreadsheet saved them: between semicolons, tabs or commas, with quotes, blanks and decimal commas, filled
     up with empty cells. An empty one follows a last line that is whole."""
     fill, separator, commas, is_whole = "", ",", -1, False
-    for number, text in enumerate(line.rstrip("\r") for line in lines):
+    for number, text in enumerate(line.rstrip("\r").lstrip(" \t") for line in lines):
         quoted = re.match('"(#(?:[^"]|"")*)"?', text)
         rest = text[quoted.end() :] if quoted else text
         kept = rest.rstrip(',;\t"' if quoted else ",;\t")
