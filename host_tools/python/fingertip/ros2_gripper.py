@@ -88,12 +88,12 @@ class _Goal:
         self._look()
         begins = ("release",) if self._opens else _CLOSES
         self._has_begun = self._has_begun or any(state in begins for state in self.grasp.states())
-        if self._state == "fault":
-            return "abort", "the grasp has failed; `fingertip grasp` shows why"
-        if not self._has_begun or self._state in begins:
+        if not self._has_begun or self._state in begins:  # a report may be of before the request
             if self._state == "approach" and self._now_mm <= self._width_mm:
                 self.grasp.ask("hold")
             return None
+        if self._state == "fault":
+            return "abort", "the grasp has failed; `fingertip grasp` shows why"
         if self.handle.is_cancel_requested:
             return "canceled", "the width stays"
         is_good = (

@@ -408,6 +408,14 @@ class Ros2(CellTest):
         for words in ("no `fingertip grasp` runs", "give 0.5 to 100 N", "opens to 85.0 mm", "2 positions", "a new goal"):
             self.assertTrue(any(words in line for line in self.node.said), (words, self.node.said))
 
+    def test_a_grasp_that_has_failed_opens(self):
+        """A report may be of before the request."""
+        steps = (("fault", 40), ("fault", 40), ("release", 60), ("open", 80))
+        grasp = mock.Mock(**{"report.side_effect": [{"state": state, "width_mm": width_mm} for state, width_mm in steps]})
+        grasp.states.side_effect = [], [], ["release"], []
+        with mock.patch.object(ros2_gripper, "RunningGrasp", return_value=grasp):
+            self.assert_ends(self.send(0.08), "succeeded", False, True)
+
 
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0], *sys.argv[5:]], verbosity=2)
