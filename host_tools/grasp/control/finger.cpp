@@ -32,10 +32,12 @@ constexpr std::uint32_t NO_PLACE = FORCE_ONLY & ~std::uint32_t{CONTACT_FLAG_UNCE
 // A tangential force as large as the normal one moves the middle of what the pad bears of the Gaussian by about so much, x and y, on
 // 12 mm of rubber, whatever the shape, but along a contact as long as the pad by less (unit.cell.face).
 constexpr double PULLED_x_mm = 3.5, PULLED_y_mm = 4.2, LONG_mm = 14.0;
-constexpr double PULLS_s = 0.025, LEAPS = 0.5; // one frame alone shows no pull
-constexpr double PLACE_SD = 0.2;               // of a load by the place
+constexpr double PULLS_s = 0.025, LEAPS = 0.5, GROWS = 1.25; // one frame alone shows no pull
+constexpr double PLACE_SD = 0.2;                             // of a load by the place
 // Share of what one place alone shows that is load at least: fingertips may be mounted another way than assumed.
 constexpr double ALONE = 0.33;
+// A place that moves by less than this a second, ratio of forces, drifts: rubber creeps. Further than DRIFT at once is a load.
+constexpr double DRIFTS_1_s = 5e-4, DRIFT = 0.02;
 constexpr double SLIDES_mm_s = 1.0;
 constexpr std::uint32_t OVER = CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND;
 // Half of the pad, with its rubber beyond the outer sensors.
@@ -109,24 +111,35 @@ void GripFinger::take(const GripTouch &touch) {
 
 void GripFinger::follow_place() {
   const double passed_s = std::max(touch_.t_s - place_t_s_, 1e-6);
+  // The same load moves a place less at a larger force; one frame alone shows no force either.
+  const double keeps = std::clamp(place_N_ / std::max(force_N_, 1e-3), 1.0 / GROWS, GROWS);
   place_t_s_ = touch_.t_s;
+  place_N_ = force_N_;
   if (!place_zero_.is_known) {
     place_zero_.take(touch_.x_mm, touch_.y_mm);
     pulled_x_ = pulled_y_ = 0.0;
     return;
   }
   const double share = std::min(passed_s / PULLS_s, 1.0);
-  const auto follow = [share](double &pulled, double moved) { pulled += share * std::clamp(moved - pulled, -LEAPS, LEAPS); };
+  const auto follow = [=](double &pulled, double moved) {
+    pulled *= keeps;
+    pulled += share * std::clamp(moved - pulled, -LEAPS, LEAPS);
+  };
   follow(pulled_x_, (touch_.x_mm - place_zero_.x) / PULLED_x_mm);
   follow(pulled_y_, (touch_.y_mm - place_zero_.y) / (PULLED_y_mm * std::min(LONG_mm / std::max(touch_.sigma_mm, 1.0), 1.0)));
 }
 
-void GripPlaceLoad::take(double now_s, double to_x, double to_y, double sticks) {
+void GripPlaceLoad::take(double now_s, double to_x, double to_y, double force_N, double sticks) {
   if (now_s <= t_s) {
     return;
   }
   const double passed_s = now_s - t_s, share = std::min(passed_s / PULLS_s, 1.0);
   t_s = now_s;
+  const double off_x = to_x - slid_x - held_x_N / force_N, off_y = to_y - slid_y - held_y_N / force_N;
+  const double off = std::max(std::hypot(off_x, off_y), 1e-9), drifts = std::min(DRIFTS_1_s * passed_s / off, 1.0);
+  const double held = std::max(1.0 - DRIFT / off, 0.0) * force_N;
+  slid_x += drifts * off_x, slid_y += drifts * off_y;
+  held_x_N += held * off_x, held_y_N += held * off_y;
   x = to_x - slid_x, y = to_y - slid_y;
   const double slid = std::max(1.0 - sticks / std::max(std::hypot(x, y), 1e-9), 0.0);
   speed_mm_s += share * (slid * std::hypot(x * PULLED_x_mm, y * PULLED_y_mm) / passed_s - speed_mm_s);
@@ -193,7 +206,7 @@ using Readings = std::array<GripReading, GRIP_FINGERS>;
 // not there, or doubted, the other shows it as far apart from it as before.
 static void load_by_place(Readings &readings, const std::array<GripFinger, GRIP_FINGERS> &fingers, const GripSettings &settings,
                           GripPlaceLoad &place) {
-  double t_s = 0.0, x = 0.0, y = 0.0;
+  double t_s = 0.0, x = 0.0, y = 0.0, force_N = 0.0;
   int there = 0;
   bool all = true;
   for (std::size_t i = 0; i < readings.size(); i++) {
@@ -209,6 +222,7 @@ static void load_by_place(Readings &readings, const std::array<GripFinger, GRIP_
       t_s = std::max(t_s, reading.t_s);
       x += reading.pulled_x;
       y += reading.pulled_y;
+      force_N += reading.force_N;
       place.take_alone(reading.pulled_x, reading.pulled_y, reading.force_N);
     }
   }
@@ -221,7 +235,8 @@ static void load_by_place(Readings &readings, const std::array<GripFinger, GRIP_
     place.is_known = true;
   }
   const double side = there == 2 ? 0.0 : readings[0].by_place ? 1.0 : -1.0;
-  place.take(t_s, x / there - side * place.apart_x, y / there - side * place.apart_y, std::min(settings.friction, PLACE_STICKS));
+  place.take(t_s, x / there - side * place.apart_x, y / there - side * place.apart_y, std::max(force_N / there, settings.touch_N),
+             std::min(settings.friction, PLACE_STICKS));
   for (GripReading &reading : readings) {
     if (reading.by_place) {
       reading.has_load = true;

@@ -125,14 +125,14 @@ private:
     }
   };
   Zero load_zero_, place_zero_;
-  double place_t_s_ = -1.0;
-  double pulled_x_ = 0.0, pulled_y_ = 0.0; // tangential over normal force, by the place
-  bool is_zeroed_ = false;                 // end_zero since begin_zero
+  double place_t_s_ = -1.0, place_N_ = 0.0; // of the last place: when, and under which force
+  double pulled_x_ = 0.0, pulled_y_ = 0.0;  // tangential over normal force, by the place
+  bool is_zeroed_ = false;                  // end_zero since begin_zero
 };
 
 // Tangential over normal force by how far the contacts have moved. What has moved further than friction holds has slid.
 struct GripPlaceLoad {
-  void take(double t_s, double to_x, double to_y, double sticks);
+  void take(double t_s, double to_x, double to_y, double force_N, double sticks);
   // Of one place. A load moves it less as the force grows, so only what it moves further adds to alone_N.
   void take_alone(double to_x, double to_y, double force_N) {
     const double moved = std::max(std::hypot(to_x - slid_x, to_y - slid_y) - alone, 0.0);
@@ -140,9 +140,10 @@ struct GripPlaceLoad {
   }
   double alone = 0.0, alone_N = 0.0; // the furthest of one place, and the load that it would be
   double t_s = 0.0, x = 0.0, y = 0.0, slid_x = 0.0, slid_y = 0.0;
-  double speed_mm_s = 0.0;             // of a slide
-  double apart_x = 0.0, apart_y = 0.0; // the first fingertip's own less this, when both were last there
-  bool is_known = false;               // both were there
+  double held_x_N = 0.0, held_y_N = 0.0; // the load that moved it so far: what else moves it slowly is drift
+  double speed_mm_s = 0.0;               // of a slide
+  double apart_x = 0.0, apart_y = 0.0;   // the first fingertip's own less this, when both were last there
+  bool is_known = false;                 // both were there
 };
 
 // The combined reading of both fingertips; a reading that is not trusted is left out.

@@ -171,10 +171,6 @@ bool GripReach::explains(double from_N, double from_s, double to_N, double to_s,
   return knows(from_s) && to_N >= least_N - 0.5 * settings.alike_N(least_N) && to_N <= most_N + 0.5 * settings.alike_N(most_N);
 }
 
-double GripReach::travel_below_cap_mm(const GripReadings &readings, const GripSettings &settings, double coming_mm) const {
-  return coming_mm - bound_.width_below(settings.cap_N, most_N(readings), width_at(readings.t_s));
-}
-
 // Whole steps to the position whose force is nearest. The least move is made when it reduces the error.
 double GripReach::nearest_steps(double off, double least_mm) const {
   const double least = std::round(least_mm / traits_.step_mm);
@@ -232,7 +228,7 @@ double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const Gr
   }
   way_mm = std::min(way_mm, whole_steps(outlook.coming_mm - rubber_.furthest_mm(outlook.width_mm)));
   way_mm = std::max(way_mm, outlook.least_mm);
-  const double below_cap_mm = travel_below_cap_mm(readings, settings, outlook.coming_mm);
+  const double below_cap_mm = outlook.coming_mm - bound_.width_below(settings.cap_N, most_N(readings), outlook.width_mm);
   if (way_mm > below_cap_mm) {
     // A grip that is too weak gets a short move even then, if the gripper's own limit keeps it below the cap.
     const bool too_weak = !readings.is_alone() && (outlook.exact || outlook.coming_N < WEAK * aim.wanted_N);

@@ -140,11 +140,6 @@ private:
     const bool stays = has_stopped(now_s) && std::abs(status_.width_mm - target_mm_) <= traits_.deadband_mm + 1e-9;
     return stays ? status_.width_mm : target_mm_;
   }
-  // Steps to this force, closing positive; force_N is the force at from_mm.
-  double steps_off(double wanted_N, double force_N, double from_mm, double coming_mm) const {
-    return (coming_mm - rubber_.width_for(wanted_N, force_N, from_mm)) / traits_.step_mm;
-  }
-  double travel_below_cap_mm(const GripReadings &readings, const GripSettings &settings, double coming_mm) const;
   double nearest_steps(double off, double least_mm) const;
 
   // What one call of aim() decides by.
@@ -160,8 +155,9 @@ private:
   void learn(const GripReadings &readings, const GripSettings &settings, double now_s);
   Outlook predict(const GripAim &aim, const GripReadings &readings, double now_s) const;
   double force_at(const Outlook &outlook, double width_mm) const { return rubber_.force_at(width_mm, outlook.force_N, outlook.width_mm); }
+  // Steps to this force, closing positive.
   double steps_to(const Outlook &outlook, double wanted_N) const {
-    return steps_off(wanted_N, outlook.force_N, outlook.width_mm, outlook.coming_mm);
+    return (outlook.coming_mm - rubber_.width_for(wanted_N, outlook.force_N, outlook.width_mm)) / traits_.step_mm;
   }
   double whole_steps(double mm) const { return traits_.step_mm * std::floor(mm / traits_.step_mm); } // rounded down, in mm
   // The widths to close and to open to. closed_mm reports a cap that shortens the move.

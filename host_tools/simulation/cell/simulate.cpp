@@ -132,17 +132,13 @@ int main(int argc, char **argv) {
   const std::size_t before_drawn = of_lift.size();
   for_lift(app.add_option("--shape", shape, "Of the object"))->check(CLI::IsMember(texts_of(SHAPES, name_of_any)))->capture_default_str();
   lift_number("--width", object.width_mm, "MM", 1.0, 500.0, "Of the object, between the fingers");
-  lift_number("--length", object.height_mm, "MM", 1.0, 500.0, "Of a cylinder, and the height of a box or plate");
-  lift_number("--off-centre", object.com_mm.x, "MM", 0.0, 250.0, "Of its centre of mass, level");
   lift_number("--mass", object.mass_kg, "KG", 0.001, 10.0, "Its mass");
   lift_number("--friction", friction, "NUMBER", 0.05, 3.0, "Its friction coefficient");
-  lift_number("--kinetic", object.kinetic_share, "SHARE", 0.3, 1.0, "Of the friction, while it slides");
   const CLI::Option *stiffness =
       for_lift(add("--stiffness", object.stiffness_N_mm, "N/MM", "Its stiffness; default: it does not yield"))->check(within(0.1, 1e6));
   for_lift(add("--crushes", object.crushes_N, "N", "More force breaks it; default: none does"))->check(within(0.1, 1e6));
   lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0, "How much wider than the object the gripper is at first");
-  lift_number("--height", object.lift_mm, "MM", 1.0, 500.0, "How far it is lifted");
-  lift_number("--lift-time", object.lift_s, "S", 0.05, 60.0, "And how long that takes");
+  lift_number("--lift-time", object.lift_s, "S", 0.05, 60.0, "How long the lift takes");
   for (std::size_t i = before_drawn; i < of_lift.size(); i++) {
     if (of_lift[i] != stiffness) { // no kind sets it
       kind->excludes(of_lift[i]);

@@ -64,6 +64,7 @@ TEST(Grip, ASlideRaisesTheGripAtOnceAndEndsAtItsMargin) {
   expect_share(friction, world.report.friction, 0.1);
   const double needed_N = world.settings.margin * world.settings.slid * 2.0 / world.report.friction;
   expect_share(needed_N, world.force_N, 0.05);
+  EXPECT_LT(world.peak_N, 1.3 * needed_N); // the tangential force of a sliding contact is its friction, no load
 }
 
 // A load that stood still before a slide may have grown since: what slides and does not slow down
@@ -116,32 +117,6 @@ TEST(Grip, WhatWasExpectedAndHasNotComeIsNotPursued) {
   EXPECT_LT(world.peak_N, 0.85 * expected_N);
 }
 
-// The tangential force of a sliding contact is its friction, no load: it does not feed itself.
-TEST(Grip, ASteadyLoadIsNotWhatSlides) {
-  GripWorld world;
-  world.carry(2.0, 0.3, 1.0);
-  const double friction = 0.7 * 2.0 / world.force_N;
-  const double needed_N = world.settings.margin * world.settings.slid * 2.0 / friction;
-  world.slide(friction, 30.0, 0.02);
-  world.load_N = 2.0;
-  world.run(0.05);
-  EXPECT_LT(world.peak_N, 1.3 * needed_N);
-}
-
-// Nor does one that slows down: it is caught already.
-TEST(Grip, WhatSlidesInALiftDoesNotFeedItself) {
-  GripWorld world;
-  world.grasp();
-  world.pull(1.5, 0.05);
-  const double friction = world.load_N / world.force_N, before_N = world.force_N;
-  world.slide(friction, 30.0, 0.015);
-  for (double speed_mm_s = 28.0; speed_mm_s > 10.0; speed_mm_s *= 0.9) {
-    world.slide(friction, speed_mm_s, 0.005); // and the slide slows down
-  }
-  EXPECT_GT(world.force_N, 1.05 * before_N);
-  EXPECT_LT(world.force_N, 1.5 * before_N);
-}
-
 // A slide is still reported when the object has been caught already. What it asked for and is not under way is given up then.
 TEST(Grip, ASlideThatSlowsDownIsNotPursued) {
   GripperTraits slow = fine_gripper();
@@ -172,16 +147,6 @@ TEST(Grip, AShortMotionFarBelowWhatHoldsIsNoSlide) {
   EXPECT_EQ(world.report.slides, 1u);
 }
 
-// What has held more a moment ago does not slide at less, unless it moves far.
-TEST(Grip, WhatHeldMoreAMomentAgoTeachesNothing) {
-  GripWorld world;
-  world.grasp();
-  world.pull(3.5, 0.2);
-  const double before = world.report.friction;
-  world.slide(0.3 * before, 6.0, 0.02);
-  EXPECT_GE(world.report.friction, before);
-}
-
 // What tells no load will tell no slide either.
 TEST(Grip, NothingIsMissingWhereNoLoadIsTold) {
   for (double stiffness = 4.0; stiffness < 12.0; stiffness += 0.5) {
@@ -198,8 +163,10 @@ TEST(Grip, NothingIsMissingWhereNoLoadIsTold) {
 }
 
 // No fingertip has a tangential force; its place moves by what it would be.
-static GripWorld blind_world(double sigma_mm) {
-  GripWorld world;
+static GripWorld blind_world(double sigma_mm, double latency_s = 0.003) {
+  GripperTraits gripper = fine_gripper();
+  gripper.latency_s = latency_s;
+  GripWorld world({}, gripper);
   world.sigma_mm = sigma_mm;
   world.pulled_mm = 4.2;
   world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
@@ -223,7 +190,7 @@ TEST(Grip, IsAsFirmAsThePlaceShows) {
     world.pull(load_N, 0.3);
     world.run(1.0);
     const double wanted_N = world.settings.margin * 0.8 * load_N / PLACE_FRICTION; // the mean of both
-    EXPECT_GT(world.force_N, 0.97 * wanted_N) << load_N;
+    EXPECT_GT(world.force_N, 0.94 * wanted_N) << load_N;
     EXPECT_LT(world.force_N, 1.4 * std::max(wanted_N, world.settings.floor_N)) << load_N;
     EXPECT_EQ(world.report.trouble & GRIP_NO_LOAD, 0u);
     const double before_N = world.peak_N;
@@ -234,7 +201,7 @@ TEST(Grip, IsAsFirmAsThePlaceShows) {
     EXPECT_LT(world.peak_N, 1.2 * before_N) << load_N;
     world.pull(0.0, 0.3);
     world.run(1.5);
-    EXPECT_GT(world.force_N, 0.97 * wanted_N) << load_N;
+    EXPECT_GT(world.force_N, 0.94 * wanted_N) << load_N;
   }
 }
 
@@ -257,6 +224,31 @@ TEST(Grip, ATiltIsNoLoad) {
       EXPECT_EQ(world.report.slides, 0u) << tilt_mm << " " << i;
     }
   }
+}
+
+// A load moves a place less as the grip grows: what the grip itself does to it while it rises is no load.
+TEST(Grip, AGripThatRisesMakesNoLoadOfThePlace) {
+  GripWorld world = blind_world(6.0, 0.025);
+  world.carry(0.5, 0.3, 1.0);
+  world.pull(1.2, 0.03);
+  world.run(0.05);
+  world.pull(0.5, 0.1);
+  world.run(1.5);
+  expect_share(world.settings.margin * 1.2 / PLACE_FRICTION, world.force_N, 0.1);
+}
+
+// Rubber that creeps under a long hold moves both places alike, slowly: that is no load. What is poured in quickly is one.
+TEST(Grip, APlaceThatDriftsSlowlyIsNoLoad) {
+  GripWorld world = blind_carrier(6.0, 0.3);
+  const double before_N = world.force_N;
+  for (int i = 0; i < 300; i++) {
+    world.moved_mm = {1e-3 * i, 1e-3 * i}; // in 200 s
+    world.run(0.667);
+  }
+  EXPECT_LT(world.force_N, 1.1 * before_N);
+  world.pull(0.9, 1.0);
+  world.run(0.5);
+  EXPECT_GT(world.force_N, 0.85 * world.settings.margin * 0.9 / PLACE_FRICTION);
 }
 
 // What moves further than friction holds slides: the grip grows, and what has slid is no load afterwards.
