@@ -1,6 +1,7 @@
 #include "libfingertip/packet_file.hpp"
 
 #include "libfingertip/error.hpp"
+#include "libfingertip/packet_fields.hpp"
 
 #include <utility>
 
@@ -8,6 +9,7 @@ namespace fingertip {
 
 PacketFile::PacketFile(const std::string &path, bool salvage, const std::string &device, const TimeSpan &interval)
     : bytes_(open_bytes(path)) {
+  state_.begun = interval.from_s <= 0;
   if (is_recording(path, *bytes_)) {
     reader_ = std::make_unique<RecordingReader>(path, salvage, device, interval);
   } else if (!interval.is_all()) {
@@ -31,6 +33,10 @@ std::optional<PacketFile::Item> PacketFile::next_of_recording() {
   } else if (item->kind == Item::Kind::packet && !item->made) {
     state_.statistics.packets++;
     state_.sequence.follow(item->packet.sequence, state_.statistics);
+    state_.begun = state_.begun || is_frame(item->packet);
+    if (!state_.begun) {
+      state_.sequence.restart();
+    }
   } else if (item->kind == Item::Kind::event && item->event.rfind(EVENT_GONE, 0) == 0) {
     state_.sequence.restart();
   }

@@ -39,7 +39,7 @@ public:
     std::deque<Item> decoded;
     std::uint64_t offset = 0;
     LineStatistics statistics;
-    bool ended = false;
+    bool ended = false, begun = true; /* begun: a frame of the interval came. What is left out before it is no loss. */
   };
   struct Place {
     std::optional<RecordingReader::Place> in_recording;

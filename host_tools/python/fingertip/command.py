@@ -16,16 +16,16 @@ def run_tool(name: str, main: Callable[[list[str]], int]) -> int:
         sys.stdout.flush()
         return status
     except FingertipError as error:
-        text = str(error)
+        text, status = str(error), getattr(error, "status", 1)
     except KeyboardInterrupt:
-        text = "interrupted"
+        text, status = "interrupted", 1
     except OSError as error:  # other files' are InputErrors
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what waits to be written would fail once more
         if isinstance(error, BrokenPipeError):  # a reader that has left has what it wanted
             return 0
-        text = f"{error.filename or 'standard output'}: {error.strerror}"
+        text, status = f"{error.filename or 'standard output'}: {error.strerror}", 1
     print(f"{name}: {printable(text)}", file=sys.stderr)
-    return 1
+    return status
 
 
 def check_range(name: str, value: float, low: float, high: float) -> None:

@@ -1,5 +1,6 @@
 """Text files, line by line, and numbers as text in them."""
 
+import contextlib
 import math
 import os
 
@@ -16,13 +17,26 @@ def shortest(value: float) -> str:
     return min(str(int(value)), text, key=len) if "e+" in text else text
 
 
+def _lock(descriptor: int) -> None:
+    """As the tool locks what it records, where the system can. Raises BlockingIOError."""
+    with contextlib.suppress(ImportError):
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
 class LineFile:
     """Whole lines, one at a time. Raises InputError."""
 
     def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
         self.path = os.fspath(path)
         try:
-            self._file = open(self.path, "wb" if replace else "xb", buffering=0)
+            self._file = open(self.path, "ab" if replace else "xb", buffering=0)
+            if os.path.isfile(self.path):
+                _lock(self._file.fileno())
+                self._file.truncate(0)
+        except BlockingIOError:
+            raise InputError(f"{self.path}: is being recorded; give another name") from None
         except FileExistsError:
             raise InputError(f"{self.path}: exists; give replace=True or another name") from None
         except OSError as error:

@@ -6,9 +6,9 @@ import functools
 import json
 import math
 import re
-import sys
 
 from .command import check_output, printable, run_tool
+from .errors import InputError
 from .files import SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm, read_lines, write_text
 from .validation.assess import Card
 from .validation.card import card_html, card_json
@@ -23,8 +23,8 @@ SKIN_mm = 12.0
 _LIVE = ("weight", "skin", "pull", "thread_height", "record", "serial")  # of these none with --from, and with --template nothing at all
 
 
-class WrongUsage(Exception):
-    pass
+class WrongUsage(InputError):
+    status = 2
 
 
 class _Parser(argparse.ArgumentParser):
@@ -140,11 +140,7 @@ def _print(card):
 
 def run(argv):
     """Exit status."""
-    try:
-        options = _options(argv)
-    except WrongUsage as error:
-        print(f"fingertip: {printable(str(error))}", file=sys.stderr)
-        return 2
+    options = _options(argv)
     outputs = [options.template, options.output, options.figures, options.record, options.form]
     for i, path in enumerate(outputs):
         if path is not None:

@@ -26,6 +26,7 @@ class Recording(CliTest):
         self.run_cli("convert", self.ftr, converted)
         again, _ = self.rows(converted)
         self.assertEqual(again[: len(rows) - 1], rows[:-1])
+        self.assertIn(" 0 packets dropped", self.run_cli("replay", self.csv, "--speed", "max", "--from", "0.5")[0])
 
     def test_the_same_twice_is_the_same_to_the_byte(self):
         def recorded():

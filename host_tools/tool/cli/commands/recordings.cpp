@@ -202,7 +202,7 @@ void convert_to_capture(const Conversion &conversion) {
 int convert(const Conversion &conversion) {
   const auto end = std::filesystem::path(conversion.to).extension();
   const bool to_capture = end == ".ftr";
-  if (!to_capture && end != ".csv" && !is_mcap_name(conversion.to)) {
+  if (!to_capture && end != ".csv" && end != ".CSV" && !is_mcap_name(conversion.to)) {
     throw WrongUsage("\"" + printable(conversion.to) + "\" must end with .csv, .mcap or .ftr, which selects the format");
   }
   if (conversion.every_row && !is_mcap_name(conversion.to)) {
