@@ -109,7 +109,7 @@ class Recording(CliTest):
             self.assertIn("is a folder; give the name of a file in it", self.error("record", self.folder, *option))
             self.assertIn("must end with .csv or .mcap", self.error("record", self.folder + "/r.mcpa", *option, status=2))
             self.assertIn("is a folder", self.error("record", self.csv, "--raw-bytes", self.folder + "/", *option))
-        for words in (["record"], ["monitor", "--record"], ["record", self.csv, "--raw-bytes"], ["grasp", "--gripper", "2f85", "-o"], ["info", "--port"]):
+        for words in (["record"], ["monitor", "--record"], ["record", self.csv, "--raw-bytes"], ["grasp", "--gripper", "2f85", "-o"]):
             self.assertIn("takes a text, and this one is empty", self.error(*words, "", status=2))
         self.assertIn("excludes", self.error("record", self.csv, "--all", "--device", "AAAA", status=2))
 

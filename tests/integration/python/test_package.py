@@ -220,7 +220,7 @@ class Streaming(DeviceTest):
             self.assertRaisesRegex(fingertip.InputError, "No space left on device", tip.record, "/dev/full", replace=True)
             writer = tip.record(self.path("r.csv"))
             self.assertRaises(fingertip.BadValueError, tip.record, self.path("other.csv"))
-            self.assertRaisesRegex(fingertip.InputError, "is being recorded", fingertip.RecordingWriter, writer.path, tip.info, replace=True)
+            self.assertRaisesRegex(fingertip.InputError, "is being rec", fingertip.RecordingWriter, writer.path, tip.info, replace=True)
             tip.read_block(20)
             full = open("/dev/full", "wb", buffering=0)
             self.addCleanup(full.close)

@@ -275,8 +275,8 @@ class Evaluation(ToolTest):
         before = recording.read_bytes()
         linked = self.folder / "linked.png"
         linked.hardlink_to(recording)
-        self.assertIn("give -o another name", self.error("evaluate", recording, scenario, "-o", linked))
-        self.assertIn("give -o another name", self.error("plot", recording, "-o", linked))
+        self.assertIn("is named twice", self.error("evaluate", recording, scenario, "-o", linked))
+        self.assertIn("is named twice", self.error("plot", recording, "-o", linked))
         self.assertIn("is a folder", self.error("evaluate", recording, scenario, "-o", self.folder))
         self.assertEqual(recording.read_bytes(), before)
 
