@@ -8,9 +8,8 @@
 
 /* warm: bitmap of the sensors that were calm just now. */
 static void begin(struct condition *condition, sensor_map warm) {
-  const uint32_t now_ms = condition->now_ms;
   memset(condition, 0, offsetof(struct condition, sensor));
-  condition->now_ms = now_ms;
+  condition->begins = true;
   condition->gate.released_ms = AGE_MAX_ms;
   for (uint8_t k = 0; k < FT_MAX_SENSORS; k++, warm >>= 1) {
     update_begin_tare(condition, k, warm & 1u ? Pa_q10(ZERO_WARM_Pa) : Pa_q10(ZERO_COLD_Pa));
@@ -205,7 +204,11 @@ static uint32_t older(uint32_t age_ms, int32_t ms) { return age_ms < AGE_MAX_ms 
 
 /* Moves all ages on. */
 static void begin_frame(struct condition *condition, const struct frame *frame) {
-  const uint32_t now_ms = (uint32_t)(frame->t_us >> 10), gap_ms = now_ms - condition->now_ms;
+  const uint32_t now_ms = (uint32_t)(frame->t_us >> 10), gap_ms = condition->begins ? 0 : now_ms - condition->now_ms;
+  for (uint8_t k = 0; condition->begins && k < FT_MAX_SENSORS; k++) {
+    condition->sensor[k].tare_begun_ms = now_ms;
+  }
+  condition->begins = false;
   const int32_t step_ms = gap_ms < STEP_MAX_ms ? (int32_t)gap_ms : STEP_MAX_ms;
   const int32_t most_ms = frame->sensor_count * UPDATE_ms, due_ms = condition->due_ms + step_ms * frame->sensor_count;
   condition->now_ms = now_ms;

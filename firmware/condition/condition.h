@@ -101,6 +101,7 @@ struct condition {
   uint32_t tared_ms; /* age of the newest tare */
   int32_t due_ms;    /* updates that are due, over all sensors */
   uint8_t next;      /* sensor to update */
+  bool begins;       /* the next frame is the first of a tare of all */
   bool touched;      /* conditioned.contact of the last frame */
   bool unsure;       /* a contact that the zero follows */
   bool sure;         /* a contact without doubt */

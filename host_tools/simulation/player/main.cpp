@@ -342,7 +342,7 @@ int repeat_capture(const std::string &capture) {
   if (r.frames == 0) {
     throw Error(capture + (repeater.tared() ? ": no frame after the tare"
                                             : ": no tare; have one within the capture, "
-                                              "before anything touches the pad"));
+                                              "before anything has touched the pad since its start"));
   }
   std::printf("{\"frames\": %llu, \"in_contact\": %llu, \"held\": %llu, \"equal\": %llu}\n", static_cast<unsigned long long>(r.frames),
               static_cast<unsigned long long>(r.in_contact), static_cast<unsigned long long>(r.held),
