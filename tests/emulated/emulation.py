@@ -45,7 +45,8 @@ def encoded(tools, *command):
 
 
 def make_scenario(path, name, seconds):
-    subprocess.run([sys.executable, ROOT / "host_tools/python", "scenario", name, "-o", path, "--seconds", str(seconds)], check=True)
+    words = ["scenario", name, "-o", path, "--seconds", str(seconds), "--overwrite"]
+    subprocess.run([sys.executable, ROOT / "host_tools/python", *words], check=True)
     return path
 
 
