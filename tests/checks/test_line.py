@@ -11,7 +11,7 @@ from contextlib import redirect_stdout
 from unittest import mock
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "firmware/wire"))
+sys.path[:0] = [str(ROOT / "firmware/wire"), str(ROOT / "host_tools/python")]
 import line  # noqa: E402
 
 PAGE = "firmware/wire/PROTOCOL.md"
@@ -103,7 +103,7 @@ class Generator(unittest.TestCase):
         self.assertIn('{"hold", "MS", "hold=MS (7 to 70)", "7 to 70 ms", nullptr, WIRE_CMD_HOLD, 0, 1,', tool)
         self.assertIn("WIRE_HOLD_MIN_ms, WIRE_HOLD_MAX_ms", tool)
         self.assertIn("command.body.cmd_hold.hold_ms = static_cast<std::uint16_t>(value);", tool)
-        output = {}
+        output = {"__name__": "fingertip.line", "__package__": "fingertip"}
         exec(texts["host_tools/python/fingertip/line.py"], output)
         setting = output["SETTINGS"][0]
         self.assertEqual((setting.argument, setting.command), ("hold_ms", output["SetHold"]))

@@ -308,18 +308,16 @@ TEST(test_zero_of_a_sensor_that_had_lost_its_state_is_taken_anew) {
 
 /* Rubber that bulges beside a press is above its zero once that press, under which it was taken, is over. */
 TEST(test_a_release_of_what_was_tared_is_no_contact) {
-  static const float bulges[] = {0.0f, 0.015f, 0.05f};
-  for (size_t i = 0; i < sizeof bulges / sizeof bulges[0]; i++) {
+  for (float bulge = 0.0f; bulge < 0.05f; bulge += 0.015f) {
     begin(4854);
     press(30000 * Pa);
     for (int k = 0; k < SENSORS; k++) {
-      frame.pressure_Pa_q10[k] -= bump(k) < 0.01f ? (int32_t)(bulges[i] * 30000.0f) * Pa : 0;
+      frame.pressure_Pa_q10[k] -= bump(k) < 0.01f ? (int32_t)(bulge * 30000.0f) * Pa : 0;
     }
     run_s(10);
     fill(AMBIENT);
     run_s(1);
-    TEST_ASSERT_FALSE(conditioned.contact);
-    TEST_ASSERT_TRUE(conditioned.tared);
+    TEST_ASSERT_TRUE(conditioned.tared && !conditioned.contact);
     run_s(60);
     TEST_ASSERT_FALSE(conditioned.zero_doubtful);
     /* A press that has moved on is one, in doubt: a sensor is far below. */
@@ -327,7 +325,7 @@ TEST(test_a_release_of_what_was_tared_is_no_contact) {
     press(30000 * Pa);
     run_s(10);
     fill(AMBIENT);
-    frame.pressure_Pa_q10[0] = AMBIENT + 10000 * Pa;
+    frame.pressure_Pa_q10[0] += 10000 * Pa;
     run_s(5);
     TEST_ASSERT_TRUE(conditioned.contact && conditioned.zero_doubtful);
   }
@@ -342,8 +340,7 @@ TEST(test_a_pause_changes_no_zero_in_a_contact) {
   TEST_ASSERT_INT32_WITHIN(100 * Pa, 20000 * Pa, conditioned.peak_Pa_q10);
   hold(500 * Pa, 1); /* less than a zero may have drifted meanwhile */
   TEST_ASSERT_TRUE(!conditioned.contact || conditioned.zero_doubtful);
-  fill(AMBIENT);
-  run_s(10);
+  hold(0, 10);
   condition_resume(&condition, 3600000);
   run(1);
   TEST_ASSERT_FALSE(conditioned.tared);
@@ -360,6 +357,5 @@ TEST(test_a_tare_keeps_what_is_known) {
   hold(20000 * Pa, 1);
   frame.valid = ALL;
   run_s(1);
-  TEST_ASSERT_EQUAL_HEX32(0, condition.guessed);
-  TEST_ASSERT_FALSE(conditioned.zero_doubtful);
+  TEST_ASSERT_FALSE(conditioned.zero_doubtful || condition.guessed);
 }
