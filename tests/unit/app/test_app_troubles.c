@@ -34,7 +34,6 @@ TEST(closing_the_port_ends_the_streams) {
   wire_receiver_init(&receiver, wire_all_layouts);
   connect_for(200);
   TEST_ASSERT_FALSE(next_packet(&packet));
-
   native_cdc_close(); /* and the next host asks before the main loop has seen it */
   native_cdc_open();
   start_streams(WIRE_STREAM_CONTACT);
