@@ -133,14 +133,13 @@ class Optimum(unittest.TestCase):
         self.assertLessEqual((um > 100).sum(), 2)
         self.assertTrue((flags[um > 100] & errors.WARNINGS).all())
 
-    def test_double_and_separable_reach_every_observable_optimum(self):
+    def test_double_reaches_every_observable_optimum(self):
         bench = errors.Bench(MEASURE, SEED, 1200, self.cache)
         for set_ in presses.SETS:
             these = bench.presses(set_)
-            for kernel in ("double", "separable"):
-                found, _ = bench.fit(kernel, errors.Variant("", 10), these.readings, these.usable, these.noise_Pa)
-                self.assertLess(errors.distance_um(found, these.best)[these.observable].max(), 0.1, kernel)
-                np.testing.assert_allclose(found["sigma_mm"][these.observable], these.best["sigma_mm"][these.observable], rtol=1e-5)
+            found, _ = bench.fit("double", errors.Variant("", 10), these.readings, these.usable, these.noise_Pa)
+            self.assertLess(errors.distance_um(found, these.best)[these.observable].max(), 0.1)
+            np.testing.assert_allclose(found["sigma_mm"][these.observable], these.best["sigma_mm"][these.observable], rtol=1e-5)
 
     def test_nothing_positive_is_no_fit(self):
         bench = errors.Bench(MEASURE, SEED, 600, self.cache)

@@ -37,7 +37,6 @@ struct Named {
 };
 constexpr Named OWN[] = {
     {"double", fitting::double_kernel},
-    {"separable", fitting::separable},
     {"naive_float", alternative<alternative_naive_float>},
     {"naive_double", alternative<alternative_naive_double>},
     {"lm_float", alternative<alternative_lm_float>},

@@ -29,13 +29,6 @@ using Solve = KernelResult (*)(const fit_array &array, const std::int32_t *press
 // The firmware's general kernel in double precision: the same guess, step limits and box.
 KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_Pa_q10, sensor_map usable, const KernelSettings &settings);
 
-// The grid kernel's iteration in double precision, for machines with a fast FPU: on a full rectangle of the build's
-// size, every sensor usable, the Gaussian separates into gx(i) gy(j). With the polynomials 1, p1, p2 and 1, q1, q2 that
-// are orthogonal under gx^2 and gy^2, the Gauss-Newton basis is orthogonal, so that there is no matrix to solve, and
-// three exponentials give all eight g. The amplitude is always the best for the shape. Steps are limited as in the
-// general kernel. It stops when it has settled: settings.iterations is the most it takes.
-KernelResult separable(const fit_array &array, const std::int32_t *pressure_Pa_q10, sensor_map usable, const KernelSettings &settings);
-
 // Solvers that a host program might use instead, by name, or nullptr. Not for several threads at once: some keep their
 // workspace. They get the same scaled readings, start from the general kernel's first guess, with the analytic
 // Jacobian, take a full array of 15 sensors only, and stop by their own rules:

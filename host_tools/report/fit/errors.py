@@ -22,14 +22,12 @@ SUBSET, FIRMWARE_GUESS, ENDS = "subset", "firmware guess", "ends early"
 FIRMWARE = {"fit": {SUBSET}, "grid": set(), "masked": {SUBSET}, "general": {SUBSET}}
 KERNELS = FIRMWARE | {
     "double": {SUBSET, FIRMWARE_GUESS},  # the general kernel's steps in double
-    "separable": set(),  # the grid kernel's iteration in double, for the host
     "naive_float": {SUBSET},
     "naive_double": {SUBSET},
     "lm_float": {SUBSET, ENDS},
     "lm_double": {SUBSET, ENDS},
 }
 LIBRARIES = ("tiny_solver", "cminpack", "ceres_reused")
-HOST_KERNEL, HOST_ITERATIONS = "separable", 12  # made for the host, which the others are compared with
 BLOCK = 400
 
 
@@ -164,16 +162,15 @@ def mixed(bench, limit):
 
 def timed(bench, limit, passes):
     """Time and error of one fit on this computer, our kernels and libraries on the same presses, block after block in an order that rotates. Kernels that
-    run a number of iterations run seven; separable goes on until it has settled, twelve at the most. us: median over blocks and passes, and the tenths of
-    them; ratio: median of the same block's time over that of separable."""
+    run a number of iterations run seven. us: median over blocks and passes, and the tenths of them; ratio: median of the same block's time over that of
+    the firmware's fit."""
     readings, usable, noise_Pa, best = mixed(bench, limit)
-    kernels = [HOST_KERNEL, *(kernel for kernel in KERNELS if kernel != HOST_KERNEL), *LIBRARIES]
+    kernels = [*KERNELS, *LIBRARIES]
     us, um = {kernel: [] for kernel in kernels}, {kernel: np.zeros(len(readings)) for kernel in kernels}
     blocks = [slice(start, start + BLOCK) for start in range(0, len(readings), BLOCK)]
     for turn, block in enumerate(blocks * passes):
         for kernel in kernels[turn % len(kernels) :] + kernels[: turn % len(kernels)]:
-            variant = Variant("", HOST_ITERATIONS if kernel == HOST_KERNEL else USUAL_ITERATIONS)
-            found, one_us = bench.fit(kernel, variant, readings[block], usable[block], noise_Pa[block], threads=1)
+            found, one_us = bench.fit(kernel, Variant(""), readings[block], usable[block], noise_Pa[block], threads=1)
             us[kernel].append(one_us)
             um[kernel][block] = distance_um(found, best[block])
     found = {}
@@ -181,7 +178,7 @@ def timed(bench, limit, passes):
         times, errors = np.sort(us[kernel]), np.sort(um[kernel])
         found[kernel] = {
             **{key: quantile(times, share) for key, share in (("us", 0.5), ("us_p10", 0.1), ("us_p90", 0.9))},
-            "ratio": quantile(np.sort(np.divide(us[kernel], us[HOST_KERNEL])), 0.5),
+            "ratio": quantile(np.sort(np.divide(us[kernel], us["fit"])), 0.5),
             "presses": len(errors),
             "p50_um": quantile(errors, 0.5),
             "p999_um": quantile(errors, 0.999),

@@ -27,7 +27,7 @@ import errors  # noqa: E402
 import stiff  # noqa: E402
 import text  # noqa: E402
 from boards import fit_cycles_of  # noqa: E402
-from presentation import BLUE, FAINT, GOAL, INK, judge, plt, save  # noqa: E402
+from presentation import BLUE, FAINT, INK, judge, plt, save  # noqa: E402
 from fingertip.command import run_tool  # noqa: E402
 from fingertip.files import write_text  # noqa: E402
 from measure import Measure  # noqa: E402
@@ -205,7 +205,6 @@ DRAWN = {
     "lm_double": ("#6f3d94", "Levenberg-Marquardt, double", ("Levenberg-Marquardt, double", "right", -4)),
     "masked": (INK, None, ("firmware, a sensor masked", "right", 0)),
     "double": (FAINT, None, ("the same steps in double", "right", 0)),
-    "separable": (GOAL, None, ("fixed point's iteration in double", "right", 0)),
     "tiny_solver": (INK, None, ("TinySolver", "right", 4)),
     "ceres_reused": (INK, None, ("Ceres", "right", 0)),
     "cminpack": (INK, None, ("cminpack", "right", 0)),
