@@ -1,6 +1,5 @@
 """Text files, line by line, and numbers as text in them."""
 
-import contextlib
 import math
 import os
 
@@ -18,11 +17,15 @@ def shortest(value: float) -> str:
 
 
 def _lock(descriptor: int) -> None:
-    """As the tool locks what it records, where the system can. Raises BlockingIOError."""
-    with contextlib.suppress(ImportError):
+    """As the tool locks what it records, where system and file system can. Raises BlockingIOError."""
+    try:
         import fcntl
 
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise
+    except (ImportError, OSError):
+        return
 
 
 class LineFile:
