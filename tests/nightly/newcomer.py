@@ -95,7 +95,7 @@ def from_nothing(_):
         systems = [os.path.join(folder, name) for name in ("test", "demo")]
         run("debootstrap", "--variant=minbase", "--include=ca-certificates", "bookworm", systems[0], mirror)
         run("git", "clone", "--quiet", ROOT, f"{systems[0]}/fingertip")
-        for path in ("/etc/resolv.conf", "/etc/pip.conf", "/root/.npmrc"):
+        for path in ("/etc/resolv.conf", "/etc/pip.conf", os.path.expanduser("~/.npmrc")):
             if os.path.exists(path):
                 shutil.copy(path, systems[0] + path)
         shutil.copytree("/etc/apt", f"{systems[0]}/etc/apt", dirs_exist_ok=True)

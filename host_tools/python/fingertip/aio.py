@@ -94,9 +94,8 @@ class AsyncFingertip:
             if is_late and not self.sync.is_returning:
                 raise NoFrameError(f"{self.sync.description}: no frame in {patience_s:g} s")
             patience_s = self.sync.patience_s
-            timer = loop.call_later(
-                patience_s, self._news.set
-            )  # wait_for() of Python before 3.12 swallows a cancellation that comes with news
+            # wait_for() of Python before 3.12 swallows a cancellation that comes with news.
+            timer = loop.call_later(patience_s, self._news.set)
             try:
                 await self._news.wait()
             finally:

@@ -13,7 +13,7 @@ extern "C" {
 // What a session ends with, and what the tool would keep of it.
 struct calibration {
   std::int32_t state;         // 0: more, 1: good, 2: refused
-  char reason[16], text[256]; // text: a sentence, why and what to do
+  char reason[16], text[512]; // text: a sentence, why and what to do
   bool solved;
   bool has_own; // the tool would keep `own`
   double width_mm, residual_share;
