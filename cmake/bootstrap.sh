@@ -88,7 +88,6 @@ xz xz-utils
 qemu-system-arm qemu-system-arm
 sigrok-cli sigrok-cli
 /usr/include/ceres/ceres.h libceres-dev
-/usr/include/cminpack-1/cminpack.h libcminpack-dev
 /usr/include/gtest/gtest.h libgtest-dev
 /usr/lib/python3/dist-packages/markdown/__init__.py python3-markdown
 /usr/lib/python3/dist-packages/pyte/__init__.py python3-pyte

@@ -34,7 +34,6 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
 // Jacobian, take a full array of 15 sensors only, and stop by their own rules:
 //   ceres_reused   one problem object for every fit, dense QR, default tolerances
 //   tiny_solver    ceres::TinySolver, sizes fixed, default tolerances
-//   cminpack       lmder with the tolerances of lmder1 at the square root of epsilon
 Solve library_named(const std::string &name);
 
 // The readings that enter, in pitches and units of the largest.

@@ -27,7 +27,7 @@ KERNELS = FIRMWARE | {
     "lm_float": {SUBSET, ENDS},
     "lm_double": {SUBSET, ENDS},
 }
-LIBRARIES = ("tiny_solver", "cminpack", "ceres_reused")
+LIBRARIES = ("tiny_solver", "ceres_reused")
 BLOCK = 400
 
 

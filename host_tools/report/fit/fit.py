@@ -114,7 +114,6 @@ GOALS = (
     ("masked_cycles", "<=", 62000),
     ("speed_vs_ceres", ">=", 20),
     ("speed_vs_tinysolver", ">=", 2),
-    ("speed_vs_cminpack", ">=", 6),
 )
 
 
@@ -143,7 +142,6 @@ def figures(results, seed):
         "masked_cycles": r.cycles_max("masked", BUILT_MASKS),
         "speed_vs_ceres": r.host["ceres_reused"]["ratio"],
         "speed_vs_tinysolver": r.host["tiny_solver"]["ratio"],
-        "speed_vs_cminpack": r.host["cminpack"]["ratio"],
         "seed": seed,
         "processor": errors.processor(),
     }
@@ -207,7 +205,6 @@ DRAWN = {
     "double": (FAINT, None, ("the same steps in double", "right", 0)),
     "tiny_solver": (INK, None, ("TinySolver", "right", 4)),
     "ceres_reused": (INK, None, ("Ceres", "right", 0)),
-    "cminpack": (INK, None, ("cminpack", "right", 0)),
 }
 LOW_um, HIGH_um = 1e-3, 1e5  # what is beyond is drawn there
 

@@ -4,8 +4,6 @@
 #include <ceres/ceres.h>
 #include <ceres/tiny_solver.h>
 #include <cmath>
-#include <cminpack.h>
-#include <limits>
 
 namespace fingertip::fitting {
 namespace {
@@ -97,31 +95,10 @@ void tiny_solver(const Samples &samples, double theta[4]) {
   std::copy(x.data(), x.data() + 4, theta);
 }
 
-int cminpack_function(void *context, int, int, const double *theta, double *residuals, double *jacobian, int stride, int what) {
-  const auto &samples = *static_cast<const Samples *>(context);
-  if (what == 1) {
-    evaluate(samples, theta, residuals, nullptr, 0, 0);
-  } else {
-    evaluate(samples, theta, nullptr, jacobian, 1, stride);
-  }
-  return 0;
-}
-
-void cminpack(const Samples &samples, double theta[4]) {
-  double residuals[SENSORS], jacobian[SENSORS * 4], work[5 * 4 + SENSORS];
-  int pivots[4];
-  Samples context = samples;
-  const double tolerance = std::sqrt(std::numeric_limits<double>::epsilon());
-  lmder1(cminpack_function, &context, SENSORS, 4, theta, residuals, jacobian, SENSORS, tolerance, pivots, work, 5 * 4 + SENSORS);
-}
-
 } // namespace
 
 Solve library_named(const std::string &name) {
-  return name == "ceres_reused"  ? with<ceres_reused>
-         : name == "tiny_solver" ? with<tiny_solver>
-         : name == "cminpack"    ? with<cminpack>
-                                 : nullptr;
+  return name == "ceres_reused" ? with<ceres_reused> : name == "tiny_solver" ? with<tiny_solver> : nullptr;
 }
 
 } // namespace fingertip::fitting
