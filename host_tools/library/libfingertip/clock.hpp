@@ -16,7 +16,6 @@
 #include <functional>
 #include <memory>
 #include <poll.h>
-#include <string>
 #include <sys/types.h>
 
 #pragma GCC visibility push(default)

@@ -12,12 +12,10 @@
 #include "libfingertip/clock.hpp"
 #include "libfingertip/framing.hpp"
 
-#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <map>
 #include <optional>
-#include <string>
 
 namespace fingertip {
 

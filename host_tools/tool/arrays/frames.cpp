@@ -15,7 +15,6 @@ extern "C" {
 #include "ms58xx/ms58xx.h"
 }
 
-#include <algorithm>
 #include <memory>
 
 using namespace fingertip::measure;

@@ -25,7 +25,6 @@
 #include "web/wasm/objects.hpp"
 
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 namespace fingertip::web {
