@@ -28,7 +28,7 @@ Bundle::Bundle(double friction, double kinetic_share) : static_(friction), kinet
 void Bundle::step(double seconds, double force_N, double stiffness_N_mm, const Motion &motion) {
   const double holds_N = friction() * force_N;
   const double damping = stiffness_N_mm * HeldObject::LOSS_s;
-  double sum_x = 0.0, sum_y = 0.0, lost_mW = 0.0;
+  double sum_x = 0.0, sum_y = 0.0;
   double slowest = std::numeric_limits<double>::infinity();
   bool slides = true;
   for (std::size_t i = 0; i < ELEMENTS; i++) {
@@ -49,13 +49,10 @@ void Bundle::step(double seconds, double force_N, double stiffness_N_mm, const M
     }
     sum_x += x;
     sum_y += y;
-    // What the motion puts in and the springs do not get.
-    lost_mW += x * motion.x_mm_s + y * motion.y_mm_s - x_N_[i] * stretch_x - y_N_[i] * stretch_y;
     const double k = stiffness_share_[i] * stiffness_N_mm * seconds;
     x_N_[i] += k * stretch_x;
     y_N_[i] += k * stretch_y;
   }
-  lost_mJ_ += lost_mW * seconds;
   // Elements that slide one against the other are no gross slip.
   constexpr double TOGETHER = 0.98;
   const double size_2 = sum_x * sum_x + sum_y * sum_y;
@@ -65,14 +62,6 @@ void Bundle::step(double seconds, double force_N, double stiffness_N_mm, const M
   rested_ = std::max(rested_, 0.0);
   pull_x_N_ = sum_x;
   pull_y_N_ = sum_y;
-}
-
-double Bundle::elastic_mJ(double stiffness_N_mm) const {
-  double sum = 0.0;
-  for (std::size_t i = 0; i < ELEMENTS; i++) {
-    sum += (x_N_[i] * x_N_[i] + y_N_[i] * y_N_[i]) / (2.0 * stiffness_share_[i] * stiffness_N_mm);
-  }
-  return sum;
 }
 
 } // namespace fingertip::web

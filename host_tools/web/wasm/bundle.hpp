@@ -31,8 +31,6 @@ public:
   double slip_mm_s() const { return slip_mm_s_; } // and how fast; 0 unless it does
   double pull_x_N() const { return pull_x_N_; }   // of the object on the rubber, last step
   double pull_y_N() const { return pull_y_N_; }
-  double lost_mJ() const { return lost_mJ_; } // in friction and the rubber's damping
-  double elastic_mJ(double stiffness_N_mm) const;
 
 private:
   static constexpr std::size_t ELEMENTS = 12;
@@ -41,7 +39,7 @@ private:
   double static_, kinetic_share_;
   double rested_ = 1.0;
   bool slips_ = false;
-  double slip_mm_s_ = 0.0, pull_x_N_ = 0.0, pull_y_N_ = 0.0, lost_mJ_ = 0.0;
+  double slip_mm_s_ = 0.0, pull_x_N_ = 0.0, pull_y_N_ = 0.0;
 };
 
 } // namespace fingertip::web
