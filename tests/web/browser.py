@@ -155,14 +155,17 @@ class Browser:
             data = data[os.write(self._to_browser, data) :]
         return self._number
 
+    def _until(self, is_so, otherwise):
+        end_s = time.monotonic() + PATIENCE_s
+        while not is_so():
+            if time.monotonic() > end_s:
+                raise TimeoutError(otherwise)
+            self._take(1)
+
     def call(self, method, session=None, **parameters):
         number = self._send(method, session, parameters)
         self._awaited.add(number)
-        end_s = time.monotonic() + PATIENCE_s
-        while number not in self._answers:
-            if time.monotonic() > end_s:
-                raise TimeoutError(f"no answer to {method}")
-            self._take(1)
+        self._until(lambda: number in self._answers, f"no answer to {method}")
         self._awaited.remove(number)
         answer = self._answers.pop(number)
         if "error" in answer:
@@ -171,11 +174,7 @@ class Browser:
 
     def saved(self, suffix):
         """The next file that a page saves, once it is whole."""
-        end_s = time.monotonic() + PATIENCE_s
-        while self._saved == self._taken:
-            if time.monotonic() > end_s:
-                raise PageError(f"no file {suffix} was saved")
-            self._take(1)
+        self._until(lambda: self._saved > self._taken, f"no file {suffix} was saved")
         self._taken += 1
         return max(self.downloads.glob(f"*{suffix}"), key=lambda path: path.stat().st_mtime)
 

@@ -515,8 +515,10 @@ class Simulations(PageTest):
         Bench.end(simulation)
         page.until(f"{self.FIRST}.state === 'closed' && /simulation has ended/.test({self.FIRST}.why)")
         self.bench.simulated(self.runtime, "--mouse")
-        driven.connected(page, 1)  # the same one again
+        driven.connected(page, 1)  # the same one again, and its hand
         self.assertEqual(page.run("fingertip.fingertips.length"), 1)
+        page.click("button", "Press")
+        page.until(f"{self.FIRST}.contact.force_N > 2")
 
     def test_two_that_no_hand_presses(self):
         self.bench.simulated(self.runtime, "--fingertips", "2")
@@ -650,8 +652,9 @@ class Everyone(PageTest):
         enter("Close")
         page.until(f"!document.querySelector('.notice') && {at} !== document.body")
         enter("Record")
-        enter("Start recording")
+        page.run("[1, 2].forEach(() => document.querySelector('dialog form').requestSubmit())")  # Enter, twice
         page.until("!document.querySelector('dialog')")
+        self.assertEqual(page.run("fingertip.fingertips[0].taps.size"), 1)
         page.until(f"{at}.closest('.doings')")
         enter("Stop")
         self.browser.saved(".csv")

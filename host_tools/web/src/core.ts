@@ -242,33 +242,6 @@ export class Decoder extends Handle {
   }
 }
 
-/** The fingertip's clock on that of the page, performance.now(). */
-export class ClockFit extends Handle {
-  constructor() {
-    super('clock', (name) => wasm.call(name));
-  }
-
-  /** In order of device time. */
-  add(sent_us: number, received_us: number, device_us: number): void {
-    this.call('add', sent_us, received_us, device_us);
-  }
-
-  /** At the last exchange, where no error is larger than uncertainty_us; null before the first. drift_ppm: positive where the fingertip's
-   * clock is fast. */
-  get estimate(): { device_us: number; host_us: number; drift_ppm: number; uncertainty_us: number } | null {
-    if (this.call('estimate', at.values) !== OK) {
-      return null;
-    }
-    const [device_us, host_us, drift_ppm, uncertainty_us] = wasm.doubles(at.values, 4);
-    return { device_us, host_us, drift_ppm, uncertainty_us };
-  }
-
-  /** The fingertip was gone: its clock may be another. */
-  restart(): void {
-    this.call('restart');
-  }
-}
-
 /** Reads a file's bytes, fed as it wants them; a CoreError states what is wrong with them. */
 export class Reader extends Handle {
   /** size: of the file in bytes. */
@@ -287,8 +260,8 @@ export class Reader extends Handle {
     }
   }
 
-  /** null: feed more. undefined: that was all. packet is null for an event. time_us: of a row, else NaN. */
-  next(): { device: number; time_us: number; packet: DevicePacket | null } | null | undefined {
+  /** null: feed more. undefined: that was all. packet is null for an event, which has a text. time_us: of a row, else NaN. */
+  next(): { device: number; time_us: number; packet: DevicePacket | null; event: string } | null | undefined {
     const status = this.call('next', at.item, at.values, VALUES, at.count);
     if (status === WAIT || status === END) {
       return status === WAIT ? null : undefined;
@@ -297,11 +270,11 @@ export class Reader extends Handle {
     const [time_us] = wasm.doubles(at.item, 1);
     const [device, type] = wasm.words(at.item + 8, 2);
     if (type === 0) {
-      return { device, time_us, packet: null };
+      return { device, time_us, packet: null, event: wasm.textAt(this.call('event')) };
     }
     const packet = blank(type);
     fill(packet, formats.get(type)!, wasm.doubles(at.values, counted()), 0);
-    return { device, time_us, packet: packet as DevicePacket };
+    return { device, time_us, packet: packet as DevicePacket, event: '' };
   }
 
   /** It is a capture of a line, no recording. */

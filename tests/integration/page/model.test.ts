@@ -1,15 +1,20 @@
-/** A fingertip's model over a line that the test speaks on: answers, refusals, losses, going and coming back; history; clocks. */
+/** A fingertip's model over a line that the test speaks on: answers, refusals, losses, going and coming back; history; what is done with it. */
 import assert from 'node:assert/strict';
 import test from 'node:test';
 import type { Line } from '../../../host_tools/web/src/line/line';
+import { SerialLine } from '../../../host_tools/web/src/line/serial_line';
 import { Flag, PacketType, Result, Stream, WIRE_VERSION } from '../../../host_tools/web/src/line/line_facts';
 import type { Contact, Info, Raw } from '../../../host_tools/web/src/line/line_facts';
 import { CommandError, Fingertip, OtherFingertip } from '../../../host_tools/web/src/model/fingertip';
 import { PATIENCE } from '../../../host_tools/web/src/model/patience';
 import { History } from '../../../host_tools/web/src/model/history';
+import { Recorder } from '../../../host_tools/web/src/recording/recorder';
+import { App } from '../../../host_tools/web/src/steps/app';
 import { commandsFor } from '../../../host_tools/web/src/steps/settings';
-import { core, decoded } from './library';
-import { vector } from './vectors';
+import { tare } from '../../../host_tools/web/src/steps/tare';
+import { factsOf } from '../../../host_tools/web/src/view/health_facts';
+import { Shown } from '../../../host_tools/web/src/view/shown';
+import { core, decoded, vector } from './library';
 
 function contactOf(frame: number, t_us: number, more: Partial<Contact> = {}): Contact {
   return { ...(core.blank(PacketType.CONTACT) as unknown as Contact), frame, t_us, ...more };
@@ -42,6 +47,8 @@ class SpokenLine implements Line {
   refuses_repeats = false;
   /** So many of the packets that follow an acknowledgement do not arrive. */
   loses = 0;
+  /** A command right behind whose acknowledgement it ends. */
+  ends_after = 0;
   device_us = 5_000_000;
   sequence = 0;
   receive: (bytes: Uint8Array, at_ms: number) => void = () => undefined;
@@ -98,6 +105,9 @@ class SpokenLine implements Line {
 
   private acknowledge({ type, sequence, t_us }: Asked, result: number): void {
     this.say({ type: PacketType.ACK, command: type, result, command_sequence: sequence, host_time_us: t_us });
+    if (this.ends_after === type) {
+      this.closed('unplugged');
+    }
   }
 
   private answer(command: Asked): void {
@@ -105,7 +115,7 @@ class SpokenLine implements Line {
     const name = { [CMD_INFO]: 'info_grasp', [CMD_HEALTH]: 'health', [CMD_CRASH]: 'crash' }[command.type];
     this.acknowledge(command, name ? Result.DONE : this.result);
     if (name && --this.loses < 0) {
-      this.say({ ...decoded(vector(name).frame)!, t_us: this.device_us, ...(this.serial && { serial: this.serial }) });
+      this.say({ ...vector(name), t_us: this.device_us, ...(this.serial && { serial: this.serial }) });
     }
   }
 }
@@ -127,7 +137,6 @@ test('it opens: info, streams, then live; frames reach model, history and taps',
   assert.equal(fingertip.state, 'live');
   assert.equal(fingertip.name, 'E66058388347A12C');
   assert.equal(line.streams, Stream.CONTACT | Stream.RAW | Stream.HEALTH);
-  assert.ok(fingertip.clock.estimate);
   const seen: number[] = [];
   const end = fingertip.tap((packet) => seen.push(packet.type));
   const flags = Flag.CONTACT | Flag.FIT_VALID;
@@ -161,9 +170,12 @@ test('refusals and questions: what a command is answered', async () => {
   await assert.rejects(fingertip.tare(true), /does not know this command/);
   line.result = Result.DONE;
   await fingertip.tare();
+  const timer = test.mock.method(globalThis, 'setTimeout');
+  await assert.rejects(fingertip.command({ type: PacketType.CMD_RATE, rate_mHz: -1 }), /rate/);
+  assert.equal(timer.mock.callCount(), 0, 'what no packet holds is not sent again');
+  timer.mock.restore();
   assert.equal((await fingertip.askCrash())?.kind, 3);
   assert.equal((await fingertip.askHealth()).type, PacketType.HEALTH);
-  assert.equal(fingertip.crash?.stuck, 5);
   await fingertip.close();
   await assert.rejects(fingertip.tare(), /not connected/);
 });
@@ -192,27 +204,124 @@ test('an answer to the first try is one, however late; a packet that was lost is
 test('the cable is pulled amid a command: it fails at once, with words; another line has it back', async () => {
   const [fingertip, line] = await opened();
   line.say(contactOf(7, 9_000_000));
+  let text = '';
+  const output = { name: '', failure: '', write: (bytes: Uint8Array) => void (text += Buffer.from(bytes)), finish: async () => {} };
+  const recorder = new Recorder(fingertip, 'csv', output, '0', assert.fail);
+  await fingertip.askInfo();
   line.silent = true;
   const waiting = fingertip.tare();
   const failed = assert.rejects(waiting, /plug it in/);
   line.closed('unplugged: plug it in again');
   await failed;
-  assert.equal(fingertip.state, 'closed');
-  assert.equal(fingertip.why, 'unplugged: plug it in again');
+  assert.deepEqual([fingertip.state, fingertip.why], ['closed', 'unplugged: plug it in again']);
 
   await assert.rejects(fingertip.open(new SpokenLine('OTHER')), OtherFingertip);
-  assert.equal(fingertip.state, 'closed');
-  assert.equal(fingertip.name, 'E66058388347A12C');
+  assert.deepEqual([fingertip.state, fingertip.name], ['closed', 'E66058388347A12C']);
 
   const back = new SpokenLine();
   await fingertip.open(back);
+  assert.equal(fingertip.contacts, 0, 'the contact from before is not the newest');
   back.say(contactOf(1, 1_000)); // it restarted
   back.say(rawOf(1, 1_000, [0, 0]));
   const { history } = fingertip;
   assert.equal(history?.end, 2);
   assert.ok(history.t_s[1]! > history.t_s[0]!);
   assert.equal(fingertip.lost, 0);
+  await recorder.finish();
+  assert.match(text, /# event: gone .*\n# event: back .*\n# packet: info /);
+  assert.equal(text.split('# event').length, 3, 'nothing of another is recorded');
   await fingertip.close();
+});
+
+test('closed amid a step of its opening: it stays closed, its line too', async () => {
+  let opened = (): void => undefined;
+  let closes = 0;
+  const close = async (): Promise<void> => void closes++;
+  const late = Object.assign(new SpokenLine(), { close, open: () => new Promise<void>((done) => (opened = done)) });
+  const fingertip = new Fingertip(late);
+  const refused = assert.rejects(fingertip.open(), /disconnected by you/);
+  await fingertip.close();
+  opened();
+  await refused;
+  assert.deepEqual([closes, late.commands], [2, []]);
+  const brief = Object.assign(new SpokenLine(), { ends_after: PacketType.CMD_STREAM });
+  await assert.rejects(new Fingertip(brief).open(), /unplugged/);
+});
+
+test('two clicks on "Disconnect" take one off the page; a tare ends with its fingertip', async () => {
+  const app = new App();
+  const [[first], [second, line]] = [await opened(), await opened()];
+  app.fingertips.push(first, second);
+  await Promise.all([app.disconnect(first), app.disconnect(first)]);
+  assert.deepEqual(app.fingertips, [second]);
+  let said = '';
+  app.notice = (text) => (said = text);
+  line.ends_after = PacketType.CMD_TARE;
+  await tare(app, second);
+  assert.match(said, /not tared: unplugged/);
+});
+
+test('a simulated fingertip that cannot be opened keeps out none of the others; a port that is none leaves the choice', async (t) => {
+  let looks = 0;
+  Object.assign(globalThis, { document: { baseURI: 'http://here/' } });
+  t.mock.method(globalThis, 'setTimeout', (then: () => void) => void setImmediate(then));
+  t.mock.method(globalThis, 'fetch', async (url: string) => {
+    const all = Response.json(looks === 0 ? [{ serial: 'A' }, { serial: 'B' }] : [], { status: looks > 0 ? 404 : 200 });
+    return /simulated$/.test(url) && ++looks ? all : new Response('too many lines are open', { status: 503 });
+  });
+  let asked = 0;
+  const open = () => Promise.reject(new DOMException('', 'NetworkError'));
+  const port = { getInfo: () => ({ usbVendorId: 0x1209, usbProductId: 1 }), open, close: open };
+  const serial = { getPorts: async () => [port], requestPort: async () => (asked++, port) };
+  Object.defineProperty(globalThis, 'navigator', { value: {}, configurable: true, writable: true });
+  const app = new App();
+  app.start();
+  while (looks < 2) {
+    await new Promise(setImmediate);
+  }
+  assert.equal(app.fingertips.length, 2);
+  Object.assign(globalThis, { navigator: { serial } });
+  await app.connect();
+  await app.connect();
+  assert.equal(asked, 1);
+});
+
+test('a port takes commands that come at once; one that hangs is closed', async () => {
+  const sent: number[] = [];
+  const write = async ([byte]: Uint8Array, { signal }: WritableStreamDefaultController): Promise<void> => {
+    await new Promise<void>((done, fail) => (byte ? done() : signal.addEventListener('abort', () => fail(signal.reason))));
+    sent.push(byte!);
+  };
+  const [readable, writable] = [new ReadableStream(), new WritableStream({ write })];
+  const close = async () => assert.ok(!writable.locked && !readable.locked && sent.push(-1));
+  const port = { readable, writable, close, open: async () => {}, setSignals: async () => {}, getInfo: () => ({}) };
+  const line = new SerialLine(port as unknown as SerialPort);
+  await line.open(() => undefined, assert.fail);
+  await Promise.all([line.send(Uint8Array.of(1)), line.send(Uint8Array.of(2))]);
+  const hangs = assert.rejects(line.send(Uint8Array.of(0)), /takes no more commands/);
+  await new Promise(setImmediate);
+  await line.close();
+  await hangs;
+  assert.deepEqual(sent, [1, 2, -1]);
+});
+
+test('what is shown as present is of a frame that has just come, by the rate that is set', async () => {
+  const [fingertip, line] = await opened();
+  const shown = new Shown(fingertip, 0);
+  const facts = (now_ms: number) =>
+    Object.fromEntries(factsOf(shown, now_ms).flatMap((group) => group.facts.map((each) => [each.name, each.value])));
+  const at = (ms: number, packet: object & { type: number }) =>
+    line.receive(core.encode({ sequence: line.sequence++, t_us: 1000 * ms, ...packet }), ms);
+  at(1e6, contactOf(1, 1e9, { flags: Flag.TARED, total_us: 1500 }));
+  at(1e6, rawOf(1, 1e9, [0]));
+  assert.equal(facts(1e6 + 600)['latency'], '1.50 ms');
+  assert.equal(facts(1e6 + 600)['answer'], undefined, 'no health packet has come');
+  at(1e6 + 900, vector('health'));
+  const { frames, latency, temperature, answer } = facts(1e6 + 1000);
+  assert.deepEqual([shown.isCurrent(1e6 + 1000), shown.state(1e6 + 1000).words], [false, 'stalled for 1 s']);
+  assert.deepEqual([frames, latency, temperature, answer], ['0 /s', undefined, undefined, undefined]);
+  fingertip.info!.rate_mHz = 1000;
+  assert.deepEqual([shown.isCurrent(1e6 + 1000), shown.state(1e6 + 1000).words], [true, 'live']);
 });
 
 test('another version of the protocol, and what is no fingertip, are told apart', async () => {
@@ -250,14 +359,22 @@ test('history: a ring with absolute numbers, times that never fall, frames that 
   assert.equal(history.end, 22);
   assert.ok(Math.abs(history.t_s[20 % 8]! - 2.022) < 1e-9);
   assert.ok(Math.abs(history.t_s[21 % 8]! - 2.023) < 1e-9);
-  history.addRaw(rawOf(5, 5010, [3, 3], { flags: Flag.TARED })); // without its contact packet: a row of its own
+  history.addRaw(rawOf(5, 5010, [3, 3], { flags: Flag.TARED | Flag.FIT_VALID })); // without its contact packet: a row of its own
   assert.equal(history.end, 23);
   assert.equal(history.flags[22 % 8], Flag.TARED);
   assert.ok(Number.isNaN(history.columns.force_N[22 % 8]));
 });
 
+/* What each vector decodes to is compared with the library and Python in tests/formats. */
+test('values that no packet may hold are refused', () => {
+  assert.throws(() => core.encode(contactOf(1, 1, { flags: Flag.FIT_VALID, x_mm: NaN })), /x_mm/);
+  assert.throws(() => core.encode(contactOf(2 ** 32, 1)), /frame/);
+  assert.throws(() => core.encode({ ...contactOf(1, 1), type: 0x7f } as object as Contact), core.CoreError);
+  assert.throws(() => core.encode({ ...core.blank(PacketType.INFO), sensor_count: 1, board: 'longer than sixteen' } as Info), /board/);
+});
+
 test('settings: commands for what differs', () => {
-  const info = decoded(vector('info_grasp').frame) as Info;
+  const info = vector('info_grasp') as Info;
   const now = { rate: '20', osr: '1024', slip_threshold: '0.75', slip_window: '100', prior: '3.125:0.5', limit: '0.625' };
   assert.deepEqual(commandsFor(info, now), []);
   assert.deepEqual(commandsFor(info, { rate: 'max', osr: '256', slip_window: '50', prior: '3.1', limit: '0.5' }), [
@@ -267,4 +384,5 @@ test('settings: commands for what differs', () => {
     { type: PacketType.CMD_PRIOR, sigma_mm: 3.1, width_mm: 0.5 },
     { type: PacketType.CMD_LOCATION_LIMIT, limit_mm: 0.5 },
   ]);
+  assert.throws(() => commandsFor(info, { rate: '20:30' }), /too much/);
 });

@@ -9,8 +9,7 @@ import test from 'node:test';
 import { PacketType } from '../../../host_tools/web/src/line/line_facts';
 import type { Contact, DevicePacket, Info, Raw } from '../../../host_tools/web/src/line/line_facts';
 import { ReadError, Replay, readItems } from '../../../host_tools/web/src/recording/replay_line';
-import { core, decoded } from './library';
-import { vector } from './vectors';
+import { core, source, vector } from './library';
 
 const tool = process.env['FINGERTIP_TOOL'] ?? '';
 const folder = mkdtempSync(join(tmpdir(), 'fingertip-page-'));
@@ -19,8 +18,7 @@ const path = (name: string): string => join(folder, name);
 
 /** Packets of both streams and others, with a fingertip that starts again amid them. */
 function session(): DevicePacket[] {
-  const of = (name: string) => decoded(vector(name).frame)!;
-  const [info, health, contact, raw] = ['info_grasp', 'health', 'contact_grasp', 'raw'].map(of) as [Info, DevicePacket, Contact, Raw];
+  const [info, health, contact, raw] = ['info_grasp', 'health', 'contact_grasp', 'raw'].map(vector) as [Info, DevicePacket, Contact, Raw];
   const packets: DevicePacket[] = [info];
   for (let frame = 1; frame < 600; frame++) {
     const t_us = 1_000_000 + 765 * frame - (frame > 400 ? 300_000 : 0);
@@ -112,6 +110,32 @@ test('a replay keeps its pace, waits, skips and hands out everything', async (t)
   replay.skip(10);
   await after(0);
   assert.deepEqual([ended, bytes], ['the replay has ended', frames(packets).length]);
+});
+
+test('a replay of two: one that was closed stays away; one that restarted has lost nothing', async () => {
+  const closed = (): void => undefined;
+  const replayed = async (bytes: Uint8Array, onLine: Replay['onLine']): Promise<void> => {
+    const replay = new Replay(new File([new Uint8Array(bytes)], 'a.csv') as unknown as globalThis.File);
+    const ended = new Promise<unknown>((onEnd) => Object.assign(replay, { onLine, onEnd, speed: 1e6 }));
+    await replay.start();
+    await ended;
+  };
+  let opened = 0;
+  await replayed(source('tests/fuzz/corpus/recording/two').subarray(1), (line) => {
+    const receive = ++opened === 2 ? () => void line.close() : closed;
+    void line.open(receive, closed);
+  });
+  assert.equal(opened, 2);
+  const decoder = new core.Decoder();
+  const writer = new core.Writer('csv', packets[0] as Info, []);
+  for (let i = 0; i < 10; i++) {
+    writer.packet({ ...packets[i]!, sequence: i < 5 ? 40_000 + i : i });
+    writer.event(i === 4 ? 'back' : 'request');
+  }
+  writer.finish('stopped', decoder.counts);
+  const receive = (bytes: Uint8Array): void => decoder.feed(bytes, closed);
+  await replayed(writer.take()!, (line) => void line.open(receive, closed));
+  assert.equal(decoder.counts.dropped_packets, 0);
 });
 
 test('torn and foreign files: a sentence, and what came before', async () => {

@@ -1,8 +1,6 @@
 /** What the page's pictures are made of: the traces' intervals, the eye and what the pointer picks, contrast, what readers of the
  * screen are told, doubt. */
 import assert from 'node:assert/strict';
-import { readFileSync } from 'node:fs';
-import { join } from 'node:path';
 import test from 'node:test';
 import { Flag, PacketType, type Contact } from '../../../host_tools/web/src/line/line_facts';
 import { History } from '../../../host_tools/web/src/model/history';
@@ -10,11 +8,11 @@ import { Buckets, Trust, intervalOf, roundAbove } from '../../../host_tools/web/
 import { cameraOf, picked, seen, type Point } from '../../../host_tools/web/src/view/camera';
 import { chartOf, clock, spansOf, ticksOf } from '../../../host_tools/web/src/view/curves';
 import { leaving } from '../../../host_tools/web/src/view/notices';
-import { contactAt, trailAt } from '../../../host_tools/web/src/view/recorded_contact';
+import { momentAt } from '../../../host_tools/web/src/view/recorded_contact';
 import { sceneOf } from '../../../host_tools/web/src/view/pad_scene';
 import { HEAT_STOPS, contrast, paletteOf, parsed } from '../../../host_tools/web/src/view/palette';
 import { Speech } from '../../../host_tools/web/src/view/speech';
-import { core } from './library';
+import { core, source } from './library';
 
 const FITTED = Flag.CONTACT | Flag.FIT_VALID | Flag.UNCERTAINTY_VALID | Flag.TARED;
 
@@ -49,7 +47,7 @@ test('an interval keeps the lowest and the highest value, and which came first',
   assert.deepEqual([first, last], [0, 99]);
   const { high, low, rises, sdHigh, sdLow } = forceOf(buckets);
   const at = buckets.slot(50);
-  assert.deepEqual([high[at], low[at], rises[at], sdHigh[at], sdLow[at], buckets.frames[at]], [9, -1, 0, 9.5, -1.5, 10]);
+  assert.deepEqual([high[at], low[at], rises[at], sdHigh[at], sdLow[at]], [9, -1, 0, 9.5, -1.5]);
   assert.equal(high[buckets.slot(51)], 2);
 });
 
@@ -97,6 +95,13 @@ test('a fingertip that restarts goes on in time, and its frame numbers are no lo
   assert.deepEqual(spansOf(buckets, 'lost', 100, last, 0.02), []);
 });
 
+test('the intervals of another fingertip at the same time are its own', () => {
+  const [five, one] = [5, 1].map((force_N) => historyOf(1000, () => ({ force_N }))) as [History, History];
+  const [buckets] = bucketsOf(five, 0.01);
+  buckets.read(one, 0.01, 0, 0.999);
+  assert.equal(forceOf(buckets).high[buckets.slot(50)], 1);
+});
+
 test('doubtful frames count only where there is no other; a value without its flag is none', () => {
   const flagsOf = (i: number) => (i < 20 && i % 2 === 0 ? FITTED : FITTED | Flag.UNCERTAIN);
   const [buckets] = bucketsOf(
@@ -130,7 +135,7 @@ test('a line is broken where frames were lost, and where none came, and nowhere 
 test('a frame number that wraps is no loss', () => {
   const history = historyOf(10, (i) => ({ force_N: 1, frame: (0xfffffffb + i) >>> 0 }));
   const [buckets] = bucketsOf(history, 0.02);
-  assert.deepEqual([buckets.frames[buckets.slot(0)], buckets.lost[buckets.slot(0)]], [10, 0]);
+  assert.equal(buckets.lost[buckets.slot(0)], 0);
 });
 
 test('solid where it can be trusted, dashed where not, and the two meet', () => {
@@ -160,32 +165,16 @@ test('limits of axes, ticks and intervals are round; times go on beyond a minute
 const PART = [0.9, 0.8] as const;
 const BOX = [-15, 15].flatMap((x) => [-24, 24].flatMap((y) => [-6, 16].map((z): Point => [x, y, z])));
 
-test('what is picked is what is seen there, from every side', () => {
-  for (const turn_deg of [-170, -32, 0, 45, 120]) {
+test('from every side the whole pad is in the picture and fills it, and what is picked is what is seen there', () => {
+  for (const turn_deg of [-170, -90, -32, 0, 45, 120]) {
     for (const tilt_deg of [12, 40, 75, 90]) {
       for (const aspect of [0.4, 1, 2.6]) {
         const camera = cameraOf({ turn_deg, tilt_deg }, aspect, BOX, PART);
-        for (const [x_mm, y_mm, z_mm] of [
-          [0, 0, 0],
-          [9, -18, 0],
-          [-14.5, 23, 0],
-          [4, 2, 10],
-        ] as const) {
-          const { right, up } = seen(camera, [x_mm, y_mm, z_mm]);
-          const at = picked(camera, right, up, z_mm);
-          assert.ok(at);
-          assert.ok(Math.hypot(at.x_mm - x_mm, at.y_mm - y_mm) < 0.01, `${turn_deg} ${tilt_deg} ${aspect}: ${at.x_mm} ${at.y_mm}`);
+        for (const point of BOX.map(([x, y, z]): Point => [0.9 * x, 0.7 * y, 0.5 * z])) {
+          const { right, up } = seen(camera, point);
+          const { x_mm, y_mm } = picked(camera, right, up, point[2])!;
+          assert.ok(Math.hypot(x_mm - point[0], y_mm - point[1]) < 0.01, `${turn_deg} ${tilt_deg} ${aspect}: ${x_mm} ${y_mm}`);
         }
-      }
-    }
-  }
-});
-
-test('the whole pad is in the picture, and fills it', () => {
-  for (const turn_deg of [-90, -32, 0, 200]) {
-    for (const tilt_deg of [12, 40, 90]) {
-      for (const aspect of [0.4, 1, 2.6]) {
-        const camera = cameraOf({ turn_deg, tilt_deg }, aspect, BOX, PART);
         const sides = (['right', 'up'] as const).flatMap((axis, i) =>
           [1, -1].map((sign) => Math.max(...BOX.map((point) => (sign * seen(camera, point)[axis]) / PART[i]))),
         );
@@ -203,7 +192,7 @@ test('from above x is to the right and y up; the sky is no place on the pad', ()
   assert.equal(picked(cameraOf({ turn_deg: 0, tilt_deg: 2 }, 1, BOX, PART), 0, 0.99), null);
 });
 
-const tokens = readFileSync(join(process.env['FINGERTIP_SOURCE'] ?? '', 'host_tools/web/src/styles/tokens.css'), 'utf8');
+const tokens = source('host_tools/web/src/styles/tokens.css').toString();
 
 for (const dark of [false, true]) {
   test(`contrast of ${dark ? 'dark' : 'light'} colours is WCAG AA's`, () => {
@@ -248,27 +237,22 @@ test('readers of the screen are told what begins, ends and changes, no faster th
   assert.equal(speech.sentence(contactOf({ flags: Flag.TARED }), 'live', 100_000), 'No contact.');
 });
 
-test('of plain notices three stay, and every fault', () => {
-  const isPlain = (text: string) => text !== 'fault';
-  assert.deepEqual(leaving(['fault', 'a', 'b', 'fault', 'c'], isPlain), []);
-  assert.deepEqual(leaving(['a', 'fault', 'b', 'c', 'fault', 'd', 'e'], isPlain), ['a', 'b']);
+test('of plain notices three stay, and every fault, once', () => {
+  const leave = (...all: string[]) => leaving(all.map((text) => ({ text, is_plain: !text.includes('fault') })));
+  assert.deepEqual([leave('a fault', 'a', 'b', 'fault', 'c'), leave('fault', 'a', 'fault', 'b', 'c', 'd')], [[], [0, 1]]);
 });
 
 const LAYOUT = { x_mm: [-9, 0, 9], y_mm: [0, 0, 0] };
-/** A picture of it, live or old. */
-const pictureOf = (contact: Contact, isLive = true) => sceneOf(LAYOUT, contact, READINGS, [], null, isLive);
+const pictureOf = (contact: Contact) => sceneOf(LAYOUT, contact, READINGS, [], null);
 const READINGS = { valid: 0b011, saturated: 0, doubtful: 0b010, pressure_Pa: new Float32Array([1000, 2000, NaN]) };
 
-test('a picture shows doubt, broken sensors, and nothing that is old', () => {
+test('a picture shows doubt and broken sensors', () => {
   const contact = contactOf({ force_N: 2, p0_Pa: 9000, sigma_mm: 3, location_sd_mm: 0.3, flags: FITTED | Flag.MODEL });
   const scene = pictureOf(contact);
   assert.deepEqual(scene.broken, [false, false, true]);
   assert.deepEqual(scene.doubtful, [false, true, false]);
   assert.equal(scene.fit?.doubtful, true);
   assert.ok(Math.abs((scene.fit?.sd_mm ?? 0) - 0.3) < 1e-6);
-  const old = pictureOf(contact, false);
-  assert.equal(old.fit, null);
-  assert.deepEqual(old.pressure_Pa, [null, null, null]);
   assert.equal(pictureOf(contactOf({ flags: Flag.TARED })).fit, null);
 });
 
@@ -302,10 +286,12 @@ test('a moment of the past is the contact of then, its trail that of the second 
     qx_N: 1,
     flags: i < 1400 || (i >= 1450 && i < 1500) ? Flag.TARED : FITTED,
   }));
-  const past = contactAt(history, 2000);
-  assert.ok(Math.abs(past.force_N - 2) < 1e-5);
-  assert.equal(past.qx_N, 0, 'without its flag');
-  const trail = trailAt(history, 2000);
+  const { contact, trail } = momentAt(history, 2);
+  assert.ok(Math.abs(contact!.force_N - 2) < 1e-5);
+  assert.equal(contact!.qx_N, 0, 'without its flag');
   assert.ok(trail.length > 5);
   trail.forEach(({ x_mm }, i) => assert.ok(x_mm >= 15 && x_mm <= 20.001 && (i === 0 || x_mm > (trail[i - 1]?.x_mm ?? 0))));
+  const ring = historyOf(5000, (i) => ({ force_N: i }), 1000);
+  const forces_N = [1, 3.5, 4.5, Infinity].map((t_s) => momentAt(ring, t_s).contact?.force_N);
+  assert.deepEqual(forces_N, [undefined, 4000, 4500, 4999]);
 });

@@ -30,6 +30,8 @@ function nameOf(port: SerialPort): string {
 export class SerialLine implements Line {
   readonly label: string;
   private reader: ReadableStreamDefaultReader<Uint8Array> | null = null;
+  private writer: WritableStreamDefaultWriter<Uint8Array> | null = null;
+  private sending: Promise<unknown> = Promise.resolve();
   private closing = false;
 
   constructor(readonly port: SerialPort) {
@@ -48,23 +50,33 @@ export class SerialLine implements Line {
     void this.read(receive, closed);
   }
 
-  async send(bytes: Uint8Array): Promise<void> {
+  /** One after the other: a port has one writer. */
+  send(bytes: Uint8Array): Promise<void> {
+    const sent = this.sending.then(() => this.write(bytes));
+    this.sending = sent.catch(() => undefined);
+    return sent;
+  }
+
+  private async write(bytes: Uint8Array): Promise<void> {
     const writable = this.port.writable;
     if (!writable) {
       throw new Error('the port is closed; press "Connect"');
     }
     const writer = writable.getWriter();
+    this.writer = writer;
     try {
       await writer.write(bytes);
     } catch {
       throw new Error('the port takes no more commands: plug the fingertip in again');
     } finally {
       writer.releaseLock();
+      this.writer = null;
     }
   }
 
   async close(): Promise<void> {
     this.closing = true;
+    await this.writer?.abort().catch(() => undefined);
     await this.reader?.cancel().catch(() => undefined);
     await this.port.close().catch(() => undefined);
   }

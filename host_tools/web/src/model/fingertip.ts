@@ -45,7 +45,6 @@ export class OtherFingertip extends Error {}
 export type PacketTap = (packet: DevicePacket) => unknown;
 
 const SILENT_ms = 1500;
-const CLOCK_EVERY_ms = 1000;
 /** Versions of the protocol that ever were. */
 const OLDEST_VERSION = 1;
 
@@ -85,9 +84,6 @@ export class Fingertip {
   why = '';
   info: Info | null = null;
   health: Health | null = null;
-  /** How its firmware last ended; null until asked for (askCrash). */
-  crash: Crash | null = null;
-  readonly clock = new core.ClockFit();
   /** null: no calibration is under way. */
   found: Found | null = null;
   /** null until its info came. */
@@ -95,19 +91,23 @@ export class Fingertip {
   /** Packets of either kind since it was opened. */
   contacts = 0;
   raws = 0;
-  /** performance.now() of the last bytes. */
+  /** performance.now() of the last bytes, and of the last contact or raw packet or the opening. */
   heard_ms = 0;
+  framed_ms = 0;
   /** A replay: it takes no commands. */
   readonly is_replay: boolean;
 
   private readonly decoder = new core.Decoder();
   private readonly listeners = new Set<() => void>();
   private readonly taps = new Set<PacketTap>();
+  /** Those of questions, which hear another fingertip too. */
+  private readonly asking = new Set<PacketTap>();
   private readonly waiting = new Set<Waiting>();
   private sequence = 0;
   private other_serial = '';
+  /** Since it was opened its info came: it is no other. */
+  private is_identified = false;
   private timer: ReturnType<typeof setInterval> | undefined;
-  private clock_asked_ms = 0;
 
   constructor(
     public line: Line,
@@ -140,7 +140,7 @@ export class Fingertip {
     return this.counts.dropped_packets;
   }
 
-  /** Called after state, info, health, crash or what a calibration found changed. Returns what ends it. */
+  /** Called after state, info, health or what a calibration found changed. Returns what ends it. */
   listen(listener: () => void): () => void {
     this.listeners.add(listener);
     return () => this.listeners.delete(listener);
@@ -162,12 +162,19 @@ export class Fingertip {
     this.line = line;
     this.state = 'opening';
     this.why = '';
+    this.is_identified = this.is_replay;
+    this.contacts = this.raws = 0;
+    this.health = null;
     this.decoder.restart();
-    this.clock.restart();
     if (this.history && this.heard_ms > 0) {
       this.history.gap_s = (performance.now() - this.heard_ms) / 1000;
     }
     this.changed();
+    const checkOpen = (): void => {
+      if (this.line !== line || this.state === 'closed') {
+        throw new Error(this.why); // closed meanwhile
+      }
+    };
     try {
       await line.open(
         (bytes, at_ms) => this.receive(bytes, at_ms),
@@ -180,18 +187,21 @@ export class Fingertip {
       if (this.is_replay) {
         return;
       }
+      checkOpen();
       await this.identify();
       await this.stream(Stream.CONTACT | Stream.RAW | Stream.HEALTH);
+      checkOpen();
     } catch (error) {
       const why =
         error instanceof OtherFingertip ? 'it is not there: plug it in again' : error instanceof Error ? error.message : String(error);
-      if ((this.state as FingertipState) !== 'closed') {
-        await line.close().catch(() => undefined);
+      await line.close().catch(() => undefined);
+      if (this.line === line && (this.state as FingertipState) !== 'closed') {
         this.gone(why);
       }
       throw error;
     }
     this.state = 'live';
+    this.framed_ms = performance.now();
     this.timer = setInterval(() => this.tick(), 250);
     this.changed();
   }
@@ -200,21 +210,21 @@ export class Fingertip {
     if (this.state === 'closed') {
       return;
     }
-    const { line } = this;
     if (!this.is_replay && this.state !== 'opening') {
       await this.stream(0).catch(() => undefined);
     }
+    const { line } = this; // it may have come back on another
     this.gone('disconnected by you; press "Connect" to have it back');
     await line.close();
   }
 
   /** Sends a command and waits for its acknowledgement; sends it again where none comes. Rejects with
    * CommandError where it is refused, with Error where nothing answers. */
-  async command(command: Command, tries = PATIENCE.tries): Promise<Ack> {
+  async command(command: Command): Promise<Ack> {
     if (this.is_replay) {
       throw new CommandError('this is a replay: it takes no commands', null);
     }
-    const ack = await this.exchange(command, tries);
+    const ack = await this.exchange(command);
     if (ack.result !== Result.DONE) {
       throw new CommandError(`${core.commandName(command.type)}: ${core.resultText(ack.result)}`, ack.result);
     }
@@ -258,7 +268,8 @@ export class Fingertip {
   private async ask(command: Question, answer: number): Promise<DevicePacket> {
     let take!: (packet: DevicePacket) => void;
     const came = new Promise<DevicePacket>((done) => (take = done));
-    const end = this.tap((packet) => packet.type === answer && take(packet));
+    const tap: PacketTap = (packet) => packet.type === answer && take(packet);
+    this.asking.add(tap);
     try {
       for (let tries = PATIENCE.tries; tries > 0; tries--) {
         await this.command({ type: command });
@@ -269,7 +280,7 @@ export class Fingertip {
       }
       throw new CommandError(`${core.commandName(command)}: no answer came; try again`, null);
     } finally {
-      end();
+      this.asking.delete(tap);
     }
   }
 
@@ -281,7 +292,8 @@ export class Fingertip {
         throw new OtherFingertip(`${this.other_serial} answers instead of ${this.name}`);
       }
     } catch (error) {
-      if (error instanceof OtherFingertip || (error instanceof CommandError && error.result !== null)) {
+      const is_refused = error instanceof CommandError && error.result !== null;
+      if (error instanceof OtherFingertip || is_refused || this.state === 'closed') {
         throw error;
       }
       const version = await this.otherVersion();
@@ -316,7 +328,7 @@ export class Fingertip {
     return this.decoder.other_version;
   }
 
-  private exchange(command: Command, tries: number): Promise<Ack> {
+  private exchange(command: Command): Promise<Ack> {
     if (this.state === 'closed') {
       return Promise.reject(new CommandError('the fingertip is not connected', null));
     }
@@ -334,13 +346,14 @@ export class Fingertip {
         failed(error);
       };
       const send = (): void => {
-        if (sent.length >= tries) {
+        if (sent.length >= PATIENCE.tries) {
           end();
           const name = core.commandName(command.type);
           return refused ? done(refused) : failed(new Error(`${name}: the fingertip does not answer; unplug it and plug it in again`));
         }
         const sequence = this.sequence++ & 0xffff;
         const sent_us = Math.round(performance.now() * 1000);
+        const frame = core.encode({ ...command, sequence, t_us: sent_us });
         const waiting: Waiting = {
           command: command.type,
           sequence,
@@ -359,9 +372,7 @@ export class Fingertip {
         sent.push(waiting);
         this.waiting.add(waiting);
         timer = setTimeout(send, answer_ms);
-        this.line
-          .send(core.encode({ ...command, sequence, t_us: sent_us }))
-          .catch((error: unknown) => fail(error instanceof Error ? error : new Error(String(error))));
+        this.line.send(frame).catch((error: unknown) => fail(error instanceof Error ? error : new Error(String(error))));
       };
       send();
     });
@@ -377,24 +388,31 @@ export class Fingertip {
   }
 
   private readonly take = (packet: DevicePacket): void => {
+    const is_other = packet.type === PacketType.INFO && this.info !== null && this.info.serial !== packet.serial;
+    if (is_other) {
+      this.other_serial = packet.serial;
+    }
+    this.is_identified ||= packet.type === PacketType.INFO && !is_other;
+    if (packet.type === PacketType.ACK) {
+      this.acknowledge(packet);
+    }
+    this.asking.forEach((tap) => tap(packet));
+    if (is_other || !this.is_identified) {
+      return;
+    }
     switch (packet.type) {
       case PacketType.CONTACT:
+        this.framed_ms = this.heard_ms;
         this.contacts++;
         this.history?.addContact(packet);
         break;
       case PacketType.RAW:
+        this.framed_ms = this.heard_ms;
         this.raws++;
         this.history ??= new History(packet.sensor_count);
         this.history.addRaw(packet);
         break;
-      case PacketType.ACK:
-        this.acknowledge(packet);
-        break;
       case PacketType.INFO:
-        if (this.info && this.info.serial !== packet.serial) {
-          this.other_serial = packet.serial;
-          break;
-        }
         if (this.history?.sensor_count !== packet.sensor_count) {
           this.history = new History(packet.sensor_count);
         }
@@ -404,14 +422,11 @@ export class Fingertip {
       case PacketType.HEALTH:
         this.health = packet;
         break;
-      case PacketType.CRASH:
-        this.crash = packet;
-        break;
     }
     for (const tap of this.taps) {
       tap(packet);
     }
-    if (packet.type === PacketType.INFO || packet.type === PacketType.HEALTH || packet.type === PacketType.CRASH) {
+    if (packet.type === PacketType.INFO || packet.type === PacketType.HEALTH) {
       this.changed();
     }
   };
@@ -419,20 +434,14 @@ export class Fingertip {
   private acknowledge(ack: Ack): void {
     const waiting = [...this.waiting].find((each) => each.command === ack.command && each.sequence === ack.command_sequence);
     if (waiting && waiting.sent_us === ack.host_time_us) {
-      this.clock.add(waiting.sent_us, this.heard_ms * 1000, ack.t_us);
       waiting.done(ack);
     }
   }
 
   private tick(): void {
-    const now_ms = performance.now();
-    if (this.state === 'live' && now_ms - this.heard_ms > SILENT_ms) {
+    if (this.state === 'live' && performance.now() - this.heard_ms > SILENT_ms) {
       this.state = 'silent';
       this.changed();
-    }
-    if (now_ms - this.clock_asked_ms > CLOCK_EVERY_ms) {
-      this.clock_asked_ms = now_ms;
-      this.command({ type: PacketType.CMD_HEALTH }, 1).catch(() => undefined);
     }
   }
 

@@ -10,6 +10,9 @@ import { CONTACT_FIELDS, CONTACT_FLAG, Flag, type Contact, type ContactField, ty
 /** Rows: 3.3 minutes at 1308 frames a second, some 48 MB with 15 sensors. */
 export const HISTORY_ROWS = 1 << 18;
 
+/** The flags under which a contact packet has quantities. */
+const QUANTITIES = CONTACT_FIELDS.reduce((bits, field) => bits | CONTACT_FLAG[field], 0);
+
 /** The readings of one frame; bitmaps by sensor. pressure_Pa [sensor]: above the tare, over the gain, as the fit
  * gets it; NaN where the reading is no measurement. */
 export interface Readings {
@@ -28,12 +31,10 @@ export class History {
   /** Device time, s; where the fingertip restarted it goes on from before. Never falls. */
   readonly t_s: Float64Array;
   readonly frame: Uint32Array;
-  /** contact_flags.h; of the raw packet where no contact packet came. */
+  /** contact_flags.h; of the raw packet where no contact packet came, without those of quantities. */
   readonly flags: Uint32Array;
   /** Frames that are missing right before this one. */
   readonly lost: Uint32Array;
-  /** Time from the sensors to the packet, us; 0 where no contact packet came. */
-  readonly total_us: Uint16Array;
   readonly valid: Float64Array;
   readonly saturated: Float64Array;
   readonly doubtful: Float64Array;
@@ -59,7 +60,6 @@ export class History {
     this.frame = new Uint32Array(capacity);
     this.flags = new Uint32Array(capacity);
     this.lost = new Uint32Array(capacity);
-    this.total_us = new Uint16Array(capacity);
     this.valid = new Float64Array(capacity);
     this.saturated = new Float64Array(capacity);
     this.doubtful = new Float64Array(capacity);
@@ -115,7 +115,6 @@ export class History {
   addContact(contact: Contact): void {
     const slot = this.slotOf(contact.frame, contact.t_us);
     this.flags[slot] = contact.flags;
-    this.total_us[slot] = contact.total_us;
     for (const { field, flag, column } of this.fields) {
       column[slot] = contact.flags & flag ? contact[field] : NaN;
     }
@@ -125,7 +124,7 @@ export class History {
     const known = this.next;
     const slot = this.slotOf(raw.frame, raw.t_us);
     if (this.next !== known) {
-      this.flags[slot] = raw.flags;
+      this.flags[slot] = raw.flags & ~QUANTITIES;
     }
     const held = (raw.flags & Flag.HELD) !== 0; // its readings are those of the frame before
     const before = (slot + this.capacity - 1) % this.capacity;
@@ -166,7 +165,7 @@ export class History {
     this.t_s[slot] = t_s;
     this.frame[slot] = frame;
     this.lost[slot] = lost;
-    this.total_us[slot] = this.valid[slot] = this.saturated[slot] = this.doubtful[slot] = 0;
+    this.valid[slot] = this.saturated[slot] = this.doubtful[slot] = 0;
     for (const { column } of this.fields) {
       column[slot] = NaN;
     }

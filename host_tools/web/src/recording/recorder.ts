@@ -32,7 +32,7 @@ export class Recorder {
   private before: LineCounts;
   private readonly end_tap: () => void;
   private readonly end_listen: () => void;
-  private was_live = true;
+  private is_gone = false;
 
   /** Begins with the next info packet: ask for one. onFailure: recording ended by itself. */
   constructor(
@@ -45,6 +45,10 @@ export class Recorder {
     this.before = fingertip.counts;
     this.end_tap = fingertip.tap((packet) =>
       this.guard(() => {
+        if (this.is_gone) {
+          this.is_gone = false;
+          this.writer?.event(`back ${utcNow()}`);
+        }
         if (!this.writer && packet.type === PacketType.INFO) {
           this.before = { ...fingertip.counts, packets: fingertip.counts.packets - 1 };
           this.writer = new Writer(kind, packet, [
@@ -61,10 +65,9 @@ export class Recorder {
       }),
     );
     this.end_listen = fingertip.listen(() => {
-      const live = fingertip.state !== 'closed';
-      if (live !== this.was_live) {
-        this.was_live = live;
-        this.guard(() => this.writer?.event(`${live ? 'back' : 'gone'} ${utcNow()}`));
+      if (fingertip.state === 'closed' && !this.is_gone) {
+        this.is_gone = true;
+        this.guard(() => this.writer?.event(`gone ${utcNow()}`));
       }
     });
   }

@@ -37,6 +37,8 @@ export interface Item {
    * without a time. */
   time_us: number;
   packet: DevicePacket;
+  /** Its port had vanished before: its numbers begin again. */
+  is_back: boolean;
 }
 
 /** What to do about an error, by enum fingertip_status. */
@@ -52,6 +54,7 @@ const AT_ONCE_bytes = 1 << 18;
 /** All that is in a file: a recording (.csv, .mcap), or bytes of a line (.ftr). Throws ReadError. */
 export async function* readItems(file: File): AsyncGenerator<Item, void, undefined> {
   const reader = new Reader(file.name, file.size);
+  const back = new Set<number>();
   let packets = 0;
   try {
     for (;;) {
@@ -64,7 +67,9 @@ export async function* readItems(file: File): AsyncGenerator<Item, void, undefin
         reader.feed(new Uint8Array(await file.slice(from, from + AT_ONCE_bytes).arrayBuffer()));
       } else if (item.packet) {
         packets++;
-        yield { device: item.device, time_us: item.time_us, packet: item.packet };
+        yield { device: item.device, time_us: item.time_us, packet: item.packet, is_back: back.delete(item.device) };
+      } else if (item.event.startsWith('back')) {
+        back.add(item.device);
       }
     }
     const problem = problemOf(reader, packets);
@@ -105,6 +110,8 @@ const ENDED_EARLY = 'the replay has ended before the end of the file';
 class ReplayLine implements Line {
   private receive: ((bytes: Uint8Array, at_ms: number) => void) | null = null;
   private closed: ((why: string) => void) | null = null;
+  private sequence = 0;
+  private ahead = 0;
 
   /** From its info packet; empty before. */
   serial = '';
@@ -133,8 +140,15 @@ class ReplayLine implements Line {
     return Promise.resolve();
   }
 
-  take(bytes: Uint8Array): void {
-    this.receive?.(bytes, performance.now());
+  take({ packet, is_back }: Item): void {
+    if (packet.type === PacketType.INFO) {
+      this.serial = packet.serial;
+    }
+    // Where they begin again they go on here: nothing was lost.
+    this.ahead = is_back ? this.sequence - packet.sequence : this.ahead;
+    const sequence = (packet.sequence + this.ahead) & 0xffff;
+    this.sequence = sequence + 1;
+    this.receive?.(encode({ ...packet, sequence }), performance.now());
   }
 
   end(why: string): void {
@@ -155,7 +169,7 @@ export class Replay {
   /** Length of the recording. */
   seconds = 0;
 
-  private readonly lines: ReplayLine[] = [];
+  private readonly lines: (ReplayLine | null)[] = []; // null: closed
   private readonly items: AsyncGenerator<Item, void, undefined>;
   private next: Item | null = null;
   private first_us = NaN;
@@ -174,10 +188,6 @@ export class Replay {
     void this.run();
   }
 
-  stop(): void {
-    this.stopped = true;
-  }
-
   /** What lies between comes at once. */
   skip(seconds: number): void {
     this.now_us += seconds * 1e6;
@@ -190,11 +200,9 @@ export class Replay {
   left(line: Line): void {
     const at = this.lines.findIndex((each) => each === line);
     if (at >= 0) {
-      delete this.lines[at];
+      this.lines[at] = null;
     }
-    if (this.lines.every((each) => !each)) {
-      this.stop();
-    }
+    this.stopped ||= this.lines.every((each) => !each);
   }
 
   private async run(): Promise<void> {
@@ -241,7 +249,8 @@ export class Replay {
     }
   }
 
-  private hand({ device, packet }: Item): void {
+  private hand(item: Item): void {
+    const { device, packet } = item;
     if (!(device in this.lines)) {
       if (packet.type !== PacketType.INFO && packet.type !== PacketType.RAW && packet.type !== PacketType.CONTACT) {
         return;
@@ -250,11 +259,7 @@ export class Replay {
       this.lines[device] = line;
       this.onLine(line);
     }
-    const line = this.lines[device];
-    if (line && packet.type === PacketType.INFO) {
-      line.serial = packet.serial;
-    }
-    line?.take(encode(packet));
+    this.lines[device]?.take(item);
   }
 
   private end(problem: string): void {

@@ -33,6 +33,7 @@ export class App {
   notice: (text: string, kind: 'plain' | 'bad') => void = () => undefined;
 
   private readonly listeners = new Set<() => void>();
+  private readonly leaving = new WeakSet<Fingertip>();
   private readonly ports = new Map<SerialPort, Fingertip>();
   /** Fingertips of `fingertip simulate`, by serial number; null: the user took it off the page. */
   private readonly served = new Map<string, Fingertip | null>();
@@ -58,14 +59,14 @@ export class App {
     }
   }
 
-  /** Asks for a port; ports that the page may use already and that are not open come first. */
+  /** Asks for a port; ports that the page may use already and that are not open come first, unless they were tried and were none. */
   async connect(): Promise<void> {
     try {
       if (!hasWebSerial()) {
         throw new Error(whyNoWebSerial());
       }
-      const waiting = (await rememberedPorts()).filter((port) => !this.isOpen(port));
-      if (waiting.length > 0) {
+      const isWaiting = (port: SerialPort): boolean => !this.isOpen(port) && this.ports.get(port)?.info !== null;
+      if ((await rememberedPorts()).some(isWaiting)) {
         await this.find();
         return;
       }
@@ -84,7 +85,7 @@ export class App {
     const serial = `51${String(++this.simulated).padStart(14, '0')}`;
     const fingertip = new Fingertip(new SimulatedFingertip(serial, this.simulated));
     this.add(fingertip);
-    fingertip.open().catch((error: unknown) => this.notice(wordsOf(error), 'bad'));
+    fingertip.open().catch((error: unknown) => this.failed(fingertip, error));
   }
 
   async replay(file: File): Promise<void> {
@@ -114,6 +115,10 @@ export class App {
 
   /** Closes it and takes it off the page. */
   async disconnect(fingertip: Fingertip): Promise<void> {
+    if (this.leaving.has(fingertip)) {
+      return;
+    }
+    this.leaving.add(fingertip);
     if (this.recorders.has(fingertip)) {
       await this.stopRecording(fingertip);
     }
@@ -209,7 +214,7 @@ export class App {
       } catch (error) {
         if (!(error instanceof OtherFingertip)) {
           this.ports.set(port, fingertip);
-          this.notice(`${fingertip.name}: ${wordsOf(error)}`, 'bad');
+          this.failed(fingertip, error);
           return;
         }
       }
@@ -217,7 +222,14 @@ export class App {
     const fingertip = new Fingertip(new SerialLine(port));
     this.ports.set(port, fingertip);
     this.add(fingertip);
-    await fingertip.open().catch((error: unknown) => this.notice(`${fingertip.name}: ${wordsOf(error)}`, 'bad'));
+    await fingertip.open().catch((error: unknown) => this.failed(fingertip, error));
+  }
+
+  /** Unless its user just takes it off the page. */
+  private failed(fingertip: Fingertip, error: unknown): void {
+    if (!this.leaving.has(fingertip)) {
+      this.notice(`${fingertip.name}: ${wordsOf(error)}`, 'bad');
+    }
   }
 
   private async lookForServed(): Promise<void> {
@@ -238,13 +250,13 @@ export class App {
           const fingertip = new Fingertip(new ServedFingertip(each));
           this.served.set(each.serial, fingertip);
           this.add(fingertip);
-          await fingertip.open();
+          await fingertip.open().catch(() => undefined); // it shows why
         } else if (known?.state === 'closed') {
-          await known.open(new ServedFingertip(each));
+          await known.open(new ServedFingertip(each)).catch(() => undefined);
         }
       }
     } catch {
-      // The server, or a simulation, has just ended: the next search shows it.
+      // The server has just ended: the next search shows it.
     }
     setTimeout(() => void this.lookForServed(), LOOK_ms);
   }

@@ -119,7 +119,7 @@ export function calibrate(fingertip: Fingertip): void {
       : info.stored & Stored.DAMAGED
         ? 'It is not calibrated; what was stored cannot be read.'
         : 'It is not calibrated.',
-    form(() => undefined, field('Weight, g', weight, 'empty: unknown, gains alone')),
+    form(field('Weight, g', weight, 'empty: unknown, gains alone')),
   );
   const begin = (work: (judges: Judges, info: Uint8Array, force_N: number | null) => Promise<void>) => async () => {
     const force_N = forceOf(weight.value);

@@ -108,12 +108,12 @@ export function field(label: string, input: HTMLElement, hint = ''): HTMLElement
   return element('p', { class: 'field' }, ...parts);
 }
 
-/** A form whose Enter key does this. */
-export function form(submit: () => void, ...content: HTMLElement[]): HTMLFormElement {
+/** A form whose Enter key presses the main button of its dialog, unless that rests. */
+export function form(...content: HTMLElement[]): HTMLFormElement {
   const made = element('form', {}, ...content);
   made.addEventListener('submit', (event) => {
     event.preventDefault();
-    submit();
+    made.closest('dialog')?.querySelector<HTMLButtonElement>('button.main')?.click();
   });
   return made;
 }

@@ -70,9 +70,7 @@ export function flash(app: App, fingertip: Fingertip): void {
       await fingertip.command({ type: PacketType.CMD_LOADER, magic: LOADER_MAGIC });
     } else if (port) {
       // What speaks another version understands this.
-      await port.open({ baudRate: LOADER_BAUD }).catch((error: unknown) => {
-        throw new Error(`its port cannot be opened (${String(error)}): hold BOOTSEL while plugging it in, then go on`);
-      });
+      await port.open({ baudRate: LOADER_BAUD }).catch(() => undefined);
       await port.close().catch(() => undefined);
     }
     dialog.setMessage('If no drive RPI-RP2 appears, hold BOOTSEL while plugging it in.');

@@ -22,7 +22,7 @@ export function record(app: App, fingertip: Fingertip): void {
       dialog.close();
     }
   };
-  const kinds = form(() => void dialog.run(start), group);
+  const kinds = form(group);
   const where =
     'showSaveFilePicker' in window
       ? 'It is written while it is recorded.'

@@ -54,6 +54,9 @@ function numbersIn(setting: Setting, text: string): number[] {
     return setting.values.map(() => 0);
   }
   const parts = text.split(':');
+  if (parts.length > setting.values.length) {
+    throw new Error(`${setting.label}: "${text}" is too much; ${setting.hint}`);
+  }
   return setting.values.map((value, i) =>
     parts[i] === undefined && value.unlessGiven !== null ? value.unlessGiven : numberIn(value, parts[i] ?? ''),
   );
@@ -126,11 +129,7 @@ export function settings(fingertip: Fingertip): void {
   const keep = (): Promise<void> => send([...changed(), { type: PacketType.CMD_KEEP, keep: 1 }], 'Set, and kept for good.');
   const forget = (): Promise<void> =>
     send([{ type: PacketType.CMD_KEEP, keep: 0 }], "Forgotten: from the next start on it has the firmware's own settings.");
-  const dialog = new Dialog(
-    `Settings of ${fingertip.name}`,
-    form(() => void dialog.run(apply), ...fields),
-    kept,
-  );
+  const dialog = new Dialog(`Settings of ${fingertip.name}`, form(...fields), kept);
   dialog.choose(
     [dialog.doing('Apply', apply, MAIN), dialog.doing('Apply and keep', keep), dialog.doing('Forget what is kept', forget)],
     'Close',

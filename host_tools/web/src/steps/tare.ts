@@ -27,12 +27,15 @@ async function tared(fingertip: Fingertip): Promise<void> {
   const end = fingertip.tap((packet) => {
     is_tared ||= (packet.type === CONTACT || packet.type === RAW) && (packet.flags & Flag.TARED) !== 0;
   });
-  for (const until_ms = performance.now() + PATIENCE.tared_ms; !is_tared && performance.now() < until_ms; ) {
+  for (
+    const until_ms = performance.now() + PATIENCE.tared_ms;
+    !is_tared && fingertip.state !== 'closed' && performance.now() < until_ms;
+  ) {
     await pause(20);
   }
   end();
   if (!is_tared) {
-    throw new Error('no frame came back tared; see "Doctor"');
+    throw new Error(fingertip.why || 'no frame came back tared; see "Doctor"');
   }
 }
 

@@ -1,18 +1,17 @@
 /** The last minutes in as many intervals as a plot has room for: of each the lowest and the highest
  * value, so that no peak is lost. Only new frames are read from one drawing to the next; moving back
  * or another interval reads the span again. */
-import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import type { History } from '../model/history';
 
-/** A column of the history, its standard deviation, the flags without which it is no value, and the one without which that is none. */
+/** A column of the history, and its standard deviation. */
 const COLUMNS = [
-  ['force_N', 'force_sd_N', Flag.FIT_VALID, Flag.UNCERTAINTY_VALID],
-  ['x_mm', 'location_sd_mm', Flag.FIT_VALID, Flag.UNCERTAINTY_VALID],
-  ['y_mm', 'location_sd_mm', Flag.FIT_VALID, Flag.UNCERTAINTY_VALID],
-  ['slip_mm', null, Flag.SLIP_VALID, 0],
-  ['qx_N', 'q_sd_N', Flag.TANGENTIAL_VALID, Flag.TANGENTIAL_VALID],
-  ['qy_N', 'q_sd_N', Flag.TANGENTIAL_VALID, Flag.TANGENTIAL_VALID],
+  ['force_N', 'force_sd_N'],
+  ['x_mm', 'location_sd_mm'],
+  ['y_mm', 'location_sd_mm'],
+  ['slip_mm', null],
+  ['qx_N', 'q_sd_N'],
+  ['qy_N', 'q_sd_N'],
 ] as const;
 export type ColumnName = (typeof COLUMNS)[number][0];
 
@@ -40,10 +39,10 @@ const NOTHING = -1;
 export class Buckets {
   readonly number: Float64Array;
   readonly flags: Uint32Array;
-  readonly frames: Uint32Array;
   readonly lost: Uint32Array;
   readonly tracks: ReadonlyMap<ColumnName, Track>;
   width_s = 0;
+  private history: History | null = null;
   private next = 0; // row of the history
   private from = 0; // oldest interval that was read whole
   private newest = NOTHING;
@@ -52,7 +51,6 @@ export class Buckets {
   constructor(readonly size: number) {
     this.number = new Float64Array(size).fill(NOTHING);
     this.flags = new Uint32Array(size);
-    this.frames = new Uint32Array(size);
     this.lost = new Uint32Array(size);
     this.tracks = new Map(
       COLUMNS.map(([name]) => [
@@ -74,9 +72,10 @@ export class Buckets {
   read(history: History, width_s: number, from_s: number, to_s: number): { first: number; last: number } {
     const last = Math.floor(to_s / width_s);
     const first = Math.max(Math.floor(from_s / width_s), last - this.size + 1);
-    const moved = width_s !== this.width_s || first < this.from || this.next < history.begin;
+    const moved = history !== this.history || width_s !== this.width_s || first < this.from || this.next < history.begin;
     if (moved) {
       this.number.fill(NOTHING);
+      this.history = history;
       this.width_s = width_s;
       this.from = first;
       this.newest = NOTHING;
@@ -104,23 +103,22 @@ export class Buckets {
     const flags = history.flags[row];
     if (this.number[slot] !== b) {
       this.number[slot] = b;
-      this.flags[slot] = this.frames[slot] = this.lost[slot] = 0;
+      this.flags[slot] = this.lost[slot] = 0;
       for (const track of this.tracks.values()) {
         track.trust[slot] = Trust.none;
       }
       this.newest = Math.max(this.newest, b);
     }
     this.flags[slot] |= flags;
-    this.frames[slot]++;
     this.lost[slot] += history.lost[row];
     const trust = flags & WARNING_FLAGS ? Trust.doubtful : Trust.good;
-    for (const [name, sdName, valid, sdValid] of COLUMNS) {
+    for (const [name, sdName] of COLUMNS) {
       const track = this.tracks.get(name)!;
-      if ((flags & valid) !== valid || trust < track.trust[slot]) {
+      const value = history.columns[name][row];
+      if (Number.isNaN(value) || trust < track.trust[slot]) {
         continue;
       }
-      const value = history.columns[name][row];
-      const sd = sdName !== null && flags & sdValid ? history.columns[sdName][row] : NaN;
+      const sd = sdName === null ? NaN : history.columns[sdName][row];
       if (trust > track.trust[slot]) {
         track.trust[slot] = trust;
         track.low[slot] = Infinity;

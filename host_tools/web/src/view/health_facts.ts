@@ -2,6 +2,7 @@
 import { Flag, Stored } from '../line/line_facts';
 import { capabilitiesText, storedText } from '../core';
 import { hasSensor } from '../model/history';
+import { momentAt } from './recorded_contact';
 import type { Level, Shown } from './shown';
 
 export interface Fact {
@@ -15,7 +16,6 @@ export interface FactGroup {
   readonly facts: readonly Fact[];
 }
 
-const ENDS = ['none', 'hard fault', 'panic', 'watchdog', 'an exception without a handler', 'stack overflow', 'start-up gave up'];
 /** A processor without a rest drops frames soon. */
 const BUSY_permille = 950;
 const LITTLE_STACK_bytes = 512;
@@ -30,11 +30,13 @@ function counted(name: string, count: number): Fact {
   return fact(name, String(count), count > 0 ? 'warning' : 'plain');
 }
 
-export function factsOf(shown: Shown): FactGroup[] {
+/** now_ms: performance.now(). */
+export function factsOf(shown: Shown, now_ms: number): FactGroup[] {
   const { info, health } = shown.fingertip;
+  const current = shown.isCurrent(now_ms);
   return [
-    { title: 'Line', facts: lineFacts(shown) },
-    ...(info ? [{ title: 'Sensors', facts: sensorFacts(shown, info.sensor_count) }] : []),
+    { title: 'Line', facts: lineFacts(shown, current) },
+    ...(info ? [{ title: 'Sensors', facts: sensorFacts(shown, info.sensor_count, current) }] : []),
     ...(health
       ? [
           {
@@ -53,24 +55,27 @@ export function factsOf(shown: Shown): FactGroup[] {
   ];
 }
 
-function lineFacts({ fingertip, frames_per_s }: Shown): Fact[] {
+function lineFacts({ fingertip, frames_per_s }: Shown, current: boolean): Fact[] {
   const { counts, contact, contacts } = fingertip;
   return [
-    fact('frames', `${frames_per_s.toFixed(0)} /s`),
+    fact('frames', `${current ? frames_per_s.toFixed(0) : 0} /s`),
     counted('lost', counts.dropped_packets),
     counted('damaged', counts.crc_errors + counts.format_errors),
     fact('received', counts.bytes < 1e6 ? `${(counts.bytes / 1e3).toFixed(0)} kB` : `${(counts.bytes / 1e6).toFixed(1)} MB`),
-    ...(contacts > 0 ? [fact('latency', `${(contact.total_us / 1000).toFixed(2)} ms`)] : []),
+    ...(contacts > 0 && current ? [fact('latency', `${(contact.total_us / 1000).toFixed(2)} ms`)] : []),
   ];
 }
 
-function sensorFacts({ fingertip, readings }: Shown, count: number): Fact[] {
-  const { health, raw, raws } = fingertip;
+function sensorFacts({ fingertip }: Shown, count: number, current: boolean): Fact[] {
+  const { health, history, raw, raws } = fingertip;
   const facts: Fact[] = [];
-  if (raws > 0) {
-    const answering = health ? sensorsOf(health.sensors_present, count).length : count;
-    const doubtful = sensorsOf(readings?.doubtful ?? 0, count).join(', ');
+  if (health && current) {
+    const answering = sensorsOf(health.sensors_present, count).length;
     facts.push(fact('answer', `${answering} of ${count}`, answering < count ? 'bad' : 'good'));
+  }
+  if (history && raws > 0 && current) {
+    const { readings } = momentAt(history, Infinity);
+    const doubtful = sensorsOf(readings?.doubtful ?? 0, count).join(', ');
     facts.push(fact('in doubt', doubtful || 'none', doubtful ? 'warning' : 'plain'));
     if (readings && readings.valid !== 2 ** count - 1) {
       facts.push(fact('without reading', sensorsOf(2 ** count - 1 - readings.valid, count).join(', '), 'bad'));
@@ -103,7 +108,7 @@ function processorFacts(health: NonNullable<Shown['fingertip']['health']>): Fact
 }
 
 function firmwareFacts({ fingertip }: Shown, info: NonNullable<Shown['fingertip']['info']>): Fact[] {
-  const { crash, contact, contacts } = fingertip;
+  const { contact, contacts } = fingertip;
   const facts = [
     fact('version', `${info.firmware_version.join('.')} ${info.git_hash}`),
     fact('board', info.board),
@@ -117,9 +122,6 @@ function firmwareFacts({ fingertip }: Shown, info: NonNullable<Shown['fingertip'
     facts.push(fact('calibrated', new Date(info.calibration_date_s * 1000).toISOString().slice(0, 10)));
   } else if (contacts > 0 && !(contact.flags & Flag.CALIBRATED)) {
     facts.push(fact('calibrated', 'no'));
-  }
-  if (crash) {
-    facts.push(fact('last crash', ENDS[crash.kind] ?? `kind ${crash.kind}`, crash.kind === 0 ? 'plain' : 'bad'));
   }
   return facts;
 }

@@ -1,6 +1,8 @@
 const PLAIN_MOST = 3;
 
-/** Those of all notices, the oldest first, that leave when one has come: a fault stays until it is closed. */
-export function leaving<Notice>(all: readonly Notice[], isPlain: (notice: Notice) => boolean): Notice[] {
-  return all.filter(isPlain).slice(0, -PLAIN_MOST);
+/** The numbers of those that leave when one has come, of all from the oldest on: the oldest plain ones, and of each text all but the last. */
+export function leaving(all: readonly { text: string | null; is_plain: boolean }[]): number[] {
+  const last = all.filter(({ text }, i) => !all.slice(i + 1).some((later) => later.text === text));
+  const left = last.filter(({ is_plain }) => is_plain).slice(0, -PLAIN_MOST);
+  return all.flatMap((each, i) => (last.includes(each) && !left.includes(each) ? [] : [i]));
 }

@@ -3,18 +3,19 @@ import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import { button, element, write } from './elements';
 import { HandPanel } from './hand_panel';
-import { contactAt, trailAt } from './recorded_contact';
+import { NOTHING_KNOWN, momentAt } from './recorded_contact';
 import { fixed } from './numbers';
 import { sceneOf } from './pad_scene';
 import { PadView } from './pad_view';
 import type { Palette } from './palette';
-import { readingsNear, type Shown, type ShownContact } from './shown';
+import type { Hand, Shown, ShownContact } from './shown';
 
 export class PadCard {
   readonly element: HTMLElement;
   hand: HandPanel | null = null;
   contact: ShownContact | null = null;
   private view: PadView | null = null;
+  private held: Hand | null = null;
   private places = '';
   private seen = '';
   private readonly nameButton: HTMLButtonElement;
@@ -58,25 +59,20 @@ export class PadCard {
     const { shown } = this;
     this.prepare();
     this.hand?.apply(now_ms);
-    const { history, truth } = shown;
+    const { truth, fingertip } = shown;
+    const { history, info, found } = fingertip;
     if (!history) {
       return false;
     }
     const current = behind_s !== null || shown.isCurrent(performance.now());
-    const seen = `${history.end} ${behind_s} ${current} ${truth?.contact} ${truth?.x_mm} ${truth?.y_mm} ${!shown.fingertip.found}`;
-    if (seen !== this.seen && shown.layout && this.view) {
+    const seen = `${history.end} ${behind_s} ${current} ${truth?.contact} ${truth?.x_mm} ${truth?.y_mm} ${!found}`;
+    if (seen !== this.seen && info && this.view) {
       this.seen = seen;
       const live = behind_s === null;
-      const row = live ? history.end - 1 : Math.min(history.rowAt(end_s - behind_s), history.end - 1);
-      const kept = row >= history.begin;
-      this.contact = live ? shown.contact : kept ? contactAt(history, row) : null;
-      const readings = kept ? readingsNear(history, row) : null;
-      if (!current) {
-        this.contact = null;
-      }
+      const { contact, readings, trail } = current ? momentAt(history, live ? Infinity : end_s - behind_s) : NOTHING_KNOWN;
+      this.contact = contact;
       const place = live && truth?.contact ? { x_mm: truth.x_mm, y_mm: truth.y_mm } : null;
-      const trail = kept && current ? trailAt(history, row) : [];
-      const scene = sceneOf(shown.layout, this.contact, readings, trail, place, current, shown.fingertip.found);
+      const scene = sceneOf(info, contact, readings, trail, place, found);
       this.view.show(scene);
       const alarm = { slips: 'SLIPS', slides: 'SLIDES', moves: 'MOVES', none: '' }[scene.alarm ?? 'none'];
       write(this.alarm, alarm);
@@ -99,21 +95,22 @@ export class PadCard {
   }
 
   private prepare(): void {
-    const { layout, hand } = this.shown;
+    const { hand } = this.shown;
+    const layout = this.shown.fingertip.info;
     const places = layout ? `${layout.x_mm} ${layout.y_mm}` : '';
+    if (hand !== this.held) {
+      this.held = hand; // of another line, where its simulation has ended and begun again
+      this.hand = hand ? new HandPanel(hand) : null;
+      this.view?.setTouch(this.hand);
+    }
     if (!layout || places === this.places) {
       return;
     }
     this.places = places;
     this.view?.element.remove();
-    const keys = hand
-      ? 'Arrow keys turn it, Home shows it from above. Press on it with the pointer.'
-      : 'Arrow keys turn it, Home shows it from above.';
-    const view = new PadView(layout, `Pad of ${this.shown.name}. ${keys}`);
+    const view = new PadView(layout, `Pad of ${this.shown.name}.`);
     this.view = view;
-    this.hand = hand ? new HandPanel(hand) : null;
-    view.touch = this.hand;
-    view.element.classList.toggle('touchable', hand !== null);
+    view.setTouch(this.hand);
     view.onLook = () => this.above.setAttribute('aria-pressed', String(view.fromAbove));
     this.empty.remove();
     this.frame.prepend(view.element);

@@ -70,29 +70,26 @@ export interface Scene {
   found: Found | null;
 }
 
-/** current: false where the newest is too old to be shown as present. */
 export function sceneOf(
   layout: ShownLayout,
   contact: ShownContact | null,
   readings: Readings | null,
   trail: readonly Place[],
   truth: Place | null,
-  current: boolean,
   found: Found | null = null,
 ): Scene {
   const count = layout.x_mm.length;
   const has = (map: number | undefined, k: number) => hasSensor(map ?? 0, k);
-  const known = current ? readings : null;
   const tared = contact === null || (contact.flags & Flag.TARED) !== 0;
   const sensors = Array.from({ length: count }, (_, k) => k);
-  const flags = current && contact ? contact.flags : 0;
+  const flags = contact?.flags ?? 0;
   return {
     layout,
     count,
-    pressure_Pa: sensors.map((k) => (known && tared && has(known.valid, k) ? (known.pressure_Pa[k] ?? null) : null)),
-    broken: sensors.map((k) => known !== null && !has(known.valid, k) && !has(known.saturated, k)),
-    saturated: sensors.map((k) => has(known?.saturated, k)),
-    doubtful: sensors.map((k) => has(known?.doubtful, k)),
+    pressure_Pa: sensors.map((k) => (readings && tared && has(readings.valid, k) ? (readings.pressure_Pa[k] ?? null) : null)),
+    broken: sensors.map((k) => readings !== null && !has(readings.valid, k) && !has(readings.saturated, k)),
+    saturated: sensors.map((k) => has(readings?.saturated, k)),
+    doubtful: sensors.map((k) => has(readings?.doubtful, k)),
     fit: contact && flags & Flag.FIT_VALID ? fitOf(contact) : null,
     trail,
     truth,

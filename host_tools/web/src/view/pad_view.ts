@@ -52,11 +52,13 @@ export class PadView {
   private labelled_ms = -Infinity;
   private touching: number | null = null;
   private turning: { id: number; x: number; y: number } | null = null;
-  /** Set for a fingertip on which a hand may press. */
-  touch: Touch | null = null;
+  private touch: Touch | null = null;
   onLook: (() => void) | null = null;
 
-  constructor(layout: ShownLayout, label: string) {
+  constructor(
+    layout: ShownLayout,
+    private readonly title: string,
+  ) {
     this.size = padSize(layout);
     const corners = (out_mm: number, z_mm: number) =>
       [-1, 1].flatMap((x) => [-1, 1].map((y): Point => [x * (this.size.x_mm + out_mm), y * (this.size.y_mm + out_mm), z_mm]));
@@ -66,11 +68,17 @@ export class PadView {
       tabindex: 0,
       role: 'application',
       'aria-roledescription': 'picture of the pad',
-      'aria-label': label,
     };
     this.element = element('div', attributes, this.canvas, this.labels);
     new ResizeObserver(() => this.fit()).observe(this.element);
     this.listen();
+  }
+
+  /** touch: of a fingertip on which a hand may press, else null. */
+  setTouch(touch: Touch | null): void {
+    this.touch = touch;
+    const keys = `${this.title} Arrow keys turn it, Home shows it from above.`;
+    this.element.setAttribute('aria-label', touch ? `${keys} Press on it with the pointer.` : keys);
   }
 
   get fromAbove(): boolean {

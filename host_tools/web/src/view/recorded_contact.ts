@@ -1,15 +1,36 @@
-/** A moment out of the last minutes, as the pad's picture shows it. */
+/** A moment out of the last minutes, or the newest, as the pad's picture shows it. */
 import { CONTACT_FIELDS, Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
-import type { History } from '../model/history';
+import type { History, Readings } from '../model/history';
 import type { Place } from './pad_scene';
 import type { ShownContact } from './shown';
 
+/** What is known of it. */
+interface Moment {
+  contact: ShownContact | null;
+  readings: Readings | null;
+  trail: readonly Place[];
+}
+
+export const NOTHING_KNOWN: Moment = { contact: null, readings: null, trail: [] };
+/** A moment this much before the oldest row is that row's: the time bar has whole steps. */
+const BEFORE_s = 1;
 const TRAIL_s = 1;
 const TRAIL_POINTS = 24;
 
+/** Infinity: the newest. Nothing of a moment that is not kept any more. */
+export function momentAt(history: History, t_s: number): Moment {
+  const row = Math.min(history.rowAt(t_s), history.end - 1);
+  if (row < history.begin || (row === history.begin && history.t_s[history.slot(row)] > t_s + BEFORE_s)) {
+    return NOTHING_KNOWN;
+  }
+  // A contact packet comes before the raw packet of its frame.
+  const readings = history.readingsAt(row) ?? history.readingsAt(row - 1);
+  return { contact: contactAt(history, row), readings, trail: trailAt(history, row) };
+}
+
 /** row: one that is kept. */
-export function contactAt(history: History, row: number): ShownContact {
+function contactAt(history: History, row: number): ShownContact {
   const slot = history.slot(row);
   const contact = { flags: history.flags[slot] ?? 0 } as ShownContact;
   for (const field of CONTACT_FIELDS) {
@@ -20,7 +41,7 @@ export function contactAt(history: History, row: number): ShownContact {
 
 /** Places without a warning in the second before a row, oldest first; none from before its contact
  * began. */
-export function trailAt(history: History, row: number): Place[] {
+function trailAt(history: History, row: number): Place[] {
   const trail: Place[] = [];
   const newest_s = history.t_s[history.slot(row)] ?? 0;
   const step_s = TRAIL_s / TRAIL_POINTS;

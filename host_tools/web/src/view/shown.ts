@@ -2,7 +2,6 @@
  * picture is drawn; nothing happens here for a packet. */
 import { Flag, Stored, type Contact, type ContactField, type Info } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
-import type { History, Readings } from '../model/history';
 import { FINGERS } from './palette';
 
 /** The newest contact, or that of a moment in the past. A value whose flag is off is 0. */
@@ -74,10 +73,6 @@ export class Shown {
     return is_replay || !info ? line.label : `fingertip ${info.serial.slice(-4)}`;
   }
 
-  get isReplay(): boolean {
-    return this.fingertip.is_replay;
-  }
-
   get hand(): Hand | null {
     const line = this.fingertip.line as Partial<Hand>;
     return line.press ? (line as Hand) : null;
@@ -88,30 +83,14 @@ export class Shown {
     return (this.fingertip.line as { truth?: ShownTruth }).truth ?? null;
   }
 
-  get layout(): ShownLayout | null {
-    return this.fingertip.info;
-  }
-
-  get history(): History | null {
-    return this.fingertip.history;
-  }
-
   /** Its firmware estimates tangential force and has a pad profile. */
   get tangential(): boolean {
     return ((this.fingertip.info?.stored ?? 0) & Stored.PAD) !== 0;
   }
 
-  get slip_threshold_mm(): number {
-    return this.fingertip.info?.slip_threshold_mm ?? 0;
-  }
-
-  get location_limit_mm(): number {
-    return this.fingertip.info?.location_limit_mm ?? 0;
-  }
-
-  /** Over the last second of what is kept. */
+  /** Over the last second of what is kept, whether or not more comes. */
   get frames_per_s(): number {
-    const { history } = this;
+    const { history } = this.fingertip;
     if (!history || history.end - history.begin < 2) {
       return 0;
     }
@@ -123,23 +102,20 @@ export class Shown {
 
   /** Whether the newest frame's report still holds. now_ms: performance.now(). */
   isCurrent(now_ms: number): boolean {
-    const { is_replay, state, heard_ms, contacts, raws } = this.fingertip;
+    const { is_replay, state, framed_ms, contacts, raws } = this.fingertip;
     const reported = contacts + raws > 0;
-    return reported && (is_replay || (state === 'live' && now_ms - heard_ms < STALLED_ms));
+    return reported && (is_replay || (state === 'live' && now_ms - framed_ms < this.stalled_ms));
   }
 
-  get contact(): ShownContact | null {
-    return this.fingertip.contacts > 0 ? this.fingertip.contact : null;
-  }
-
-  /** Of the newest frame whose raw packet is there. */
-  get readings(): Readings | null {
-    return this.history && readingsNear(this.history, this.history.end - 1);
+  /** Two frames at a rate that somebody has set. */
+  private get stalled_ms(): number {
+    const { info } = this.fingertip;
+    return Math.max(STALLED_ms, info?.rate_mHz ? 2e6 / info.rate_mHz : 0);
   }
 
   /** In words, and how much it matters. */
   state(now_ms: number): { words: string; level: Level } {
-    const { state, is_replay, why, heard_ms, health } = this.fingertip;
+    const { state, is_replay, why, framed_ms, health, history } = this.fingertip;
     if (state === 'closed') {
       return { words: why || 'disconnected', level: is_replay ? 'plain' : 'bad' };
     }
@@ -152,19 +128,13 @@ export class Shown {
     if (health && health.sensors_present === 0) {
       return { words: 'no sensor answers', level: 'bad' };
     }
-    const silent_ms = now_ms - heard_ms;
-    if (silent_ms > STALLED_ms) {
+    const silent_ms = now_ms - framed_ms;
+    if (silent_ms > this.stalled_ms) {
       return { words: `stalled for ${Math.floor(silent_ms / 1000)} s`, level: 'bad' };
     }
-    const flags = this.contact?.flags;
-    if (flags !== undefined && !(flags & Flag.TARED)) {
+    if (history && this.isCurrent(now_ms) && !(history.flags[history.slot(history.end - 1)] & Flag.TARED)) {
       return { words: 'taring', level: 'warning' };
     }
     return { words: 'live', level: 'good' };
   }
-}
-
-/** Of a row, or of the one before: a contact packet comes before the raw packet of its frame. */
-export function readingsNear(history: History, row: number): Readings | null {
-  return history.readingsAt(row) ?? history.readingsAt(row - 1);
 }

@@ -1,6 +1,5 @@
 /** Force, place, load and slip over time, and which flags were set: one axis of time for all. */
-import { Flag } from '../line/line_facts';
-import { FLAGS } from '../model/flags';
+import { FLAGS, Flag } from '../line/line_facts';
 import uPlot from 'uplot';
 import { Buckets, intervalOf, roundAbove, type ColumnName } from './buckets';
 import { chartOf, clock, spansOf, ticksOf, type Chart, type Span } from './curves';
@@ -115,8 +114,7 @@ export class Traces {
 
   draw(fingertip: Shown, history: History, span: Span): void {
     if (fingertip.tangential !== this.tangential || fingertip.finger !== this.finger) {
-      this.tangential = fingertip.tangential;
-      this.finger = fingertip.finger;
+      ({ tangential: this.tangential, finger: this.finger } = fingertip);
       this.build();
     }
     const inner = this.width - AXIS_px - RIGHT_px;
@@ -145,18 +143,18 @@ export class Traces {
   }
 
   /** Axes that seldom jump: round limits, which shrink only when far too wide. */
-  private scale(drawn: Drawn, chart: Chart, fingertip: Shown): void {
+  private scale(drawn: Drawn, chart: Chart, { fingertip: { info } }: Shown): void {
     const { plot } = drawn;
     const most = Math.max(0, ...plot.columns.map((name) => chart.most.get(name)!));
     drawn.threshold = null;
     if (plot.columns[0] === 'x_mm') {
-      const { x_mm, y_mm } = fingertip.layout ? padSize(fingertip.layout) : { x_mm: 1, y_mm: 1 };
+      const { x_mm, y_mm } = info ? padSize(info) : { x_mm: 1, y_mm: 1 };
       drawn.high = Math.max(x_mm, y_mm);
     } else if (plot.tangential) {
       drawn.high = steady(drawn.high, Math.max(most, LEAST_PULL_N));
     } else if (plot.columns[0] === 'slip_mm') {
-      drawn.threshold = fingertip.slip_threshold_mm || null;
-      drawn.high = steady(drawn.high, Math.max(most, 0.1, 1.2 * fingertip.slip_threshold_mm));
+      drawn.threshold = info?.slip_threshold_mm || null;
+      drawn.high = steady(drawn.high, Math.max(most, 0.1, 1.2 * (drawn.threshold ?? 0)));
     } else {
       drawn.high = steady(drawn.high, Math.min(Math.max(most * 1.05, 1), MOST_N));
     }

@@ -135,7 +135,8 @@ export class View {
     const notice = element('div', { class: `notice ${level}` }, element('p', {}, text));
     notice.append(button('Close', () => notice.remove(), { class: 'small' }));
     this.notices.append(notice);
-    leaving([...this.notices.children], (each) => each.classList.contains('plain')).forEach((each) => each.remove());
+    const all = [...this.notices.children];
+    leaving(all.map((each) => ({ text: each.textContent, is_plain: each.matches('.plain') }))).forEach((i) => all[i].remove());
     setTimeout(() => level === 'plain' && notice.remove(), NOTICE_ms);
   }
 
@@ -210,9 +211,9 @@ export class View {
       this.ends.clear();
       return;
     }
-    for (const [fingertip, { history }] of this.shown) {
+    for (const fingertip of this.shown.keys()) {
       if (!this.ends.has(fingertip)) {
-        this.ends.set(fingertip, newest_s(history));
+        this.ends.set(fingertip, newest_s(fingertip.history));
       }
     }
   }
@@ -259,7 +260,8 @@ export class View {
   }
 
   private drawChosen(shown: Shown, card: PadCard, behind_s: number | null, now_ms: number): boolean {
-    const { fingertip, history } = shown;
+    const { fingertip } = shown;
+    const { history } = fingertip;
     const end_s = this.ends.get(fingertip) ?? newest_s(history);
     const fresh = behind_s === null && history !== null && history.end !== this.tracedEnd;
     let drawn = false;
@@ -277,7 +279,7 @@ export class View {
     }
     if (now_ms - this.healthAt_ms >= HEALTH_INTERVAL_ms) {
       this.healthAt_ms = now_ms;
-      this.health.show(factsOf(shown));
+      this.health.show(factsOf(shown, performance.now()));
       const kept = history !== null && history.end > history.begin;
       const oldest_s = kept ? (history.t_s[history.slot(history.begin)] ?? 0) : end_s;
       this.timeline.length_s = end_s - oldest_s;
@@ -291,12 +293,12 @@ export class View {
     }
     const { contact, hand } = card;
     write(this.heading, shown.name);
-    this.timeline.isReplay = shown.isReplay;
+    this.timeline.isReplay = shown.fingertip.is_replay;
     this.doingsPlace.setAttribute('aria-label', `What to do with ${shown.name}`);
     const truth = this.timeline.behind_s === null ? shown.truth : null;
-    this.numbers.show(contact, shown.tangential, shown.location_limit_mm, truth);
-    if (hand && hand.element.parentElement !== this.handPlace) {
-      this.handPlace.replaceChildren(hand.element);
+    this.numbers.show(contact, shown.tangential, shown.fingertip.info?.location_limit_mm ?? 0, truth);
+    if ((hand?.element ?? null) !== this.handPlace.firstElementChild) {
+      this.handPlace.replaceChildren(...(hand ? [hand.element] : []));
     }
     if (this.timeline.behind_s === null) {
       const several = this.shown.size > 1 ? `${shown.name}: ` : '';
