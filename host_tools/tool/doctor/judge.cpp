@@ -127,6 +127,10 @@ private:
 
   void rule() {
     bool denied = facts_.failure && facts_.failure->code == ErrorCode::permission_denied;
+    const bool is_wanted = facts_.is_plugged_in && !(facts_.failure && facts_.failure->code == ErrorCode::not_simulated);
+    if (!is_wanted && !denied) {
+      return;
+    }
     if (facts_.rule.empty()) {
       add(denied ? Verdict::bad : Verdict::warn, "rule", "no udev rule lets users without privileges open fingertips",
           advice(ErrorCode::permission_denied));
@@ -191,7 +195,9 @@ private:
       add(Verdict::warn, "firmware", text + "; this tool is of version " + version(facts_.tool_version),
           "install this tool's with `fingertip flash`, or use the other's tool");
     }
-    if (!wiring_ || wiring_->sensor_count != info.sensor_count) {
+    if (text_field(info.board) == "native") {
+      add(Verdict::ok, "board", "none: its firmware runs on a computer, with simulated sensors");
+    } else if (!wiring_ || wiring_->sensor_count != info.sensor_count) {
       add(Verdict::warn, "board", text_field(info.board) + " with " + count(info.sensor_count, "sensor") + " is unknown to this tool",
           "pins and the rate to expect are those of its own documents");
       wiring_.reset();

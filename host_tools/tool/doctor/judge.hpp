@@ -24,6 +24,7 @@ struct Facts {
   std::array<unsigned, 3> tool_version{};
   bool knows_computer = true; /* false: a web page asks, so nothing is known of rule and holders */
   std::string rule;           /* path of a file; empty: none */
+  bool is_plugged_in = true;  /* false: a pseudo-terminal, as simulated ones have, which udev knows nothing of */
   std::string port;           /* as it is opened; empty: none was found */
   bool is_shared = false;     /* the one that has it open serves it to others */
   Holders holders{{}, true};

@@ -41,6 +41,7 @@ class Port(RealPort, CliTest):
             )
             _, out, _ = self.world.run([FINGERTIP, "doctor", "--seconds", "1", "--port", self.port], env=self.environment)
             self.assertRegex(out, rf"fingertip.*{process.pid}")
+            self.assertNotIn("udev", out)  # which knows no pseudo-terminal
             process.kill()
             process.communicate()
             self.assertRegex(self.run_cli("info", "--port", self.port)[0], r"(?m)^serial +E660583883265A2C$")

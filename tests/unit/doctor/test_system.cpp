@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <pty.h>
 #include <sys/wait.h>
+#include <utility>
 
 namespace fs = std::filesystem;
 
@@ -24,35 +25,26 @@ protected:
 };
 
 /* A pseudo-terminal that another process has open. */
-class HeldPort {
-public:
+struct HeldPort {
+  char path[64];
+  int master = -1;
+  pid_t process = forkpty(&master, path, nullptr, nullptr);
+
   HeldPort() {
-    char path[64];
-    child_ = forkpty(&master_, path, nullptr, nullptr);
-    if (child_ == 0) {
+    while (process == 0) {
       pause();
-      _exit(0);
     }
-    path_ = path;
   }
   ~HeldPort() {
     release();
-    close(master_);
+    close(master);
   }
   void release() {
-    if (child_ > 0) {
-      kill(child_, SIGKILL);
-      waitpid(child_, nullptr, 0);
-      child_ = 0;
+    if (const pid_t held = std::exchange(process, 0)) {
+      kill(held, SIGKILL);
+      waitpid(held, nullptr, 0);
     }
   }
-  const std::string &path() const { return path_; }
-  int process() const { return child_; }
-
-private:
-  int master_ = -1;
-  std::string path_;
-  pid_t child_ = 0;
 };
 
 TEST_F(System, RuleIsFoundWhereUdevLooks) {
@@ -76,20 +68,20 @@ TEST_F(System, WhatDoesNotActIsNoRule) {
 
 TEST_F(System, HolderIsNamed) {
   HeldPort port;
-  auto holders = fingertip::holders_of(port.path(), "/");
+  auto holders = fingertip::holders_of(port.path, "/");
   ASSERT_EQ(holders.seen.size(), 1u);
-  EXPECT_EQ(holders.seen[0].process, port.process());
+  EXPECT_EQ(holders.seen[0].process, port.process);
   EXPECT_FALSE(holders.seen[0].name.empty());
   /* by another name of the same device */
-  fs::create_symlink(port.path(), folder_ / "link");
+  fs::create_symlink(port.path, folder_ / "link");
   EXPECT_EQ(fingertip::holders_of(folder_ / "link", "/").seen.size(), 1u);
 }
 
 TEST_F(System, NobodyHoldsWhatWasReleasedOrIsMine) {
   HeldPort port;
   port.release();
-  int mine = open(port.path().c_str(), O_RDWR | O_NOCTTY);
-  EXPECT_TRUE(fingertip::holders_of(port.path(), "/").seen.empty());
+  int mine = open(port.path, O_RDWR | O_NOCTTY);
+  EXPECT_TRUE(fingertip::holders_of(port.path, "/").seen.empty());
   close(mine);
   EXPECT_TRUE(fingertip::holders_of(folder_ / "none", "/").seen.empty());
 }

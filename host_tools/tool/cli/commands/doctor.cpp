@@ -133,6 +133,8 @@ Facts gather(const DoctorOptions &options, const std::function<bool()> &stop, co
     Way way = choose_way(options.choice, options.root);
     facts.is_shared = !way.socket.empty();
     facts.port = device_of(way, options.root);
+    std::error_code none;
+    facts.is_plugged_in = std::filesystem::canonical(facts.port, none).parent_path() != "/dev/pts";
     facts.holders = holders_of(facts.port, options.root);
     auto transport = open_way(way, options.root);
     facts.port = transport->description();
