@@ -78,10 +78,8 @@ static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, 
   const std::size_t count = x_mm.size(), placements_of_each = reading_Pa.size(1);
   require(reading_Pa.size(2) == count && sensors.size(1) == count && own.size(1) == count && t_s.size(1) == placements_of_each,
           "arrays of another number of sensors or placements");
-  Array layout;
-  layout.pitch_mm = pitch_mm;
-  layout.x_mm.assign(x_mm.data, x_mm.data + count);
-  layout.y_mm.assign(y_mm.data, y_mm.data + count);
+  const Array layout{pitch_mm, {x_mm.data, x_mm.data + count}, {y_mm.data, y_mm.data + count}};
+  check_places(layout);
   fingertip::twin::in_parallel(found.size(), [&](std::size_t session) {
     std::vector<Placement> placements(placements_of_each);
     for (std::size_t i = 0; i < placements_of_each; i++) {

@@ -69,6 +69,7 @@ static void solve_placements(Batch<const double, 1> x_mm, Batch<const double, 1>
   require(levels.size(1) == 2 && levels.size(2) == sensors && gains.size(1) == sensors, "another number of sensors");
   require(solved.size() == 1 && gains.size() == 2, "no room for what is found");
   const Array array{pitch_mm, {x_mm.data, x_mm.data + sensors}, {y_mm.data, y_mm.data + sensors}};
+  check_places(array);
   std::vector<Placement> all(placements.size());
   for (std::size_t i = 0; i < all.size(); i++) {
     const double *const reading_Pa = levels.row(i);

@@ -41,19 +41,22 @@ auto session_from(const std::string &path, const std::string &device, const Make
   return recorded;
 }
 
-/* Placements of a weight. on_placement gets the session after each. Throws Error where it holds no pressures. */
+/* Placements of a weight. on_placement gets the session after each, and its time since the first pressures. Throws Error where it holds
+ * none. */
 inline Recorded<GainSession> gain_session_from(const std::string &path, const std::string &device,
-                                               const std::function<void(const GainSession &)> &on_placement) {
-  bool pressures = false;
+                                               const std::function<void(const GainSession &, double)> &on_placement) {
+  std::optional<double> begun_s;
   auto recorded = session_from(
       path, device, [](const wire_info &info) { return GainSession(info); },
       [&](const GainSession &session, const wire_packet &packet, bool taken) {
-        pressures = pressures || packet.type == WIRE_RAW;
+        if (packet.type == WIRE_RAW && !begun_s) {
+          begun_s = frame_of(packet).t_s;
+        }
         if (taken) {
-          on_placement(session);
+          on_placement(session, session.placements().back().t_s - *begun_s);
         }
       });
-  if (!pressures) {
+  if (!begun_s) {
     throw Error(printable(path) + ": has no pressures to calibrate from; record with a firmware that sends them (fingertip info: raw)");
   }
   return std::move(*recorded);

@@ -15,7 +15,6 @@ extern "C" {
 namespace fingertip::calibrating {
 
 constexpr double Q10 = 1024.0;
-constexpr double PITCHES_MOST = 128.0; /* of a sensor from the pad's middle */
 
 static std::string percent(double share) { return fixed(100.0 * share, 1) + " %"; }
 
@@ -51,11 +50,7 @@ Array array_of(const wire_info &info) {
       }
     }
   }
-  for (std::size_t k = 0; k < array.sensors(); k++) { /* places between them are tried */
-    if (!std::isfinite(array.pitch_mm) || !(std::hypot(array.x_mm[k], array.y_mm[k]) / array.pitch_mm <= PITCHES_MOST)) {
-      throw Error("the sensors' places, x_mm, y_mm and pitch_mm, are none of a pad; build the firmware of this pad again");
-    }
-  }
+  check_places(array);
   return array;
 }
 

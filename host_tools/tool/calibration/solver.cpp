@@ -1,5 +1,6 @@
 #include "tool/calibration/solver.hpp"
 
+#include "libfingertip/error.hpp"
 #include "tool/calibration/optimiser.hpp"
 
 #include <algorithm>
@@ -336,6 +337,16 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
 }
 
 } // namespace
+
+void check_places(const Array &array) {
+  constexpr double PITCH_MOST_mm = 1000.0, PITCHES_MOST = 128.0; /* of a sensor from the pad's middle: places between them are tried */
+  for (std::size_t k = 0; k < array.sensors(); k++) {
+    const bool has_pitch = array.pitch_mm > 0.0 && array.pitch_mm <= PITCH_MOST_mm;
+    if (!has_pitch || !(std::hypot(array.x_mm[k], array.y_mm[k]) <= PITCHES_MOST * array.pitch_mm)) {
+      throw Error("the sensors' places, x_mm, y_mm and pitch_mm, are none of a pad; describe it again, and build its firmware of that");
+    }
+  }
+}
 
 Solution solve(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions, bool keep_all) {
   return solve_any(array, placements, assumptions, keep_all, nullptr);

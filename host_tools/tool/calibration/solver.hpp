@@ -47,6 +47,9 @@ struct Array {
   std::size_t sensors() const { return x_mm.size(); }
 };
 
+/* Throws Error where they lie nowhere, or far apart, or the pitch is none. */
+void check_places(const Array &array);
+
 /* One settled placement. */
 struct Placement {
   double t_s = 0.0;               /* of the readings, on any clock that goes on */

@@ -119,8 +119,11 @@ class Gains(CalibrateTest):
         self.assertLess(float(sd), 0.03)
         out, _ = self.calibrate("--from", placed, "--dry-run", "--weight", "306")
         self.assertAlmostEqual(float(re.search(r"force scale +1\.000 +(\d\.\d+)", out)[1]), float(scale), delta=0.005)
-        out, _ = self.calibrate("--from", placed, "--dry-run")
+        late = pathlib.Path(self.folder, "late.csv")
+        late.write_text(re.sub(r"(?m)^(\d+),", lambda row: f"{int(row[1]) + 10**9},", pathlib.Path(placed).read_text()))
+        out, _ = self.calibrate("--from", late, "--dry-run")
         self.assertIn("force scale         unknown", out)
+        self.assertRegex(out, r"^placement 1, \d\.\d s: ")  # since the recording began
 
     def test_writes_into_the_fingertip_it_is_of(self):
         with self.device(f"serial={serial}"):

@@ -297,9 +297,9 @@ void calibrate(const CalibrateOptions &options) {
       options, calibrating::check_firmware, [](const wire_info &info) { return GainSession(info); },
       [&](CalibratedDevice &device, GainSession &session) { work_live(device, session, options.colour); },
       [&] {
-        return calibrating::gain_session_from(options.from, options.choice.device, [](const GainSession &session) {
+        return calibrating::gain_session_from(options.from, options.choice.device, [](const GainSession &session, double t_s) {
           const Placement &found = session.placements().back();
-          std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n", session.placements().size(), found.t_s,
+          std::printf("placement %zu, %.1f s: strongest reading %.1f kPa\n", session.placements().size(), t_s,
                       1e-3 * *std::max_element(found.reading_Pa.begin(), found.reading_Pa.end()));
         });
       });
