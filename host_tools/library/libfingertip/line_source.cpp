@@ -4,6 +4,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 
 namespace fingertip {
@@ -13,6 +14,9 @@ namespace {
 class FileBytes : public ByteSource {
 public:
   explicit FileBytes(const std::string &path) : path_(path), file_(path, std::ios::binary) {
+    if (file_ && !std::filesystem::is_regular_file(path)) {
+      throw Error(ErrorCode::cannot_read, path + ": is a folder, a device or a pipe, no file");
+    }
     file_.seekg(0, std::ios::end);
     size_ = static_cast<std::uint64_t>(file_.tellg());
     check();
@@ -42,6 +46,13 @@ private:
 } // namespace
 
 std::unique_ptr<ByteSource> open_bytes(const std::string &path) { return std::make_unique<FileBytes>(path); }
+
+std::vector<std::uint8_t> all_bytes(const std::string &path) {
+  FileBytes file(path);
+  std::vector<std::uint8_t> bytes(file.size());
+  bytes.resize(file.read(0, reinterpret_cast<char *>(bytes.data()), bytes.size()));
+  return bytes;
+}
 
 std::unique_ptr<LineSource> open_lines(const std::string &path) { return lines_of(path, open_bytes(path)); }
 

@@ -9,6 +9,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <vector>
 
 #pragma GCC visibility push(default)
 namespace fingertip {
@@ -62,6 +63,7 @@ std::unique_ptr<LineSource> lines_of(const std::string &path, std::unique_ptr<By
 
 /* Of files. Throw Error if it cannot be read. */
 std::unique_ptr<ByteSource> open_bytes(const std::string &path);
+std::vector<std::uint8_t> all_bytes(const std::string &path);
 std::unique_ptr<LineSource> open_lines(const std::string &path);
 
 /* Seconds since a recording began, as the log times of an MCAP file count them (RECORDING.md). */

@@ -85,6 +85,7 @@ OutputFile::OutputFile(const std::string &path, bool replace, Appears appears)
   } else {
     fd_ = open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (replace ? 0 : O_EXCL), 0666);
     fail_if_recorded(path, fd_);
+    is_new_ = !exists;
     if (exists && S_ISREG(old.st_mode) && fd_ >= 0 && ftruncate(fd_, 0) != 0) {
       close(fd_);
       fd_ = -1;
@@ -97,8 +98,8 @@ OutputFile::OutputFile(const std::string &path, bool replace, Appears appears)
 
 OutputFile::~OutputFile() {
   close(fd_);
-  if (!temporary_.empty()) {
-    unlink(temporary_.c_str());
+  if (!temporary_.empty() || (is_new_ && length_ == 0)) {
+    unlink((temporary_.empty() ? target_ : temporary_).c_str());
   }
 }
 
@@ -116,7 +117,7 @@ void OutputFile::append(const void *bytes, std::size_t length) {
     if (count <= 0) {
       int error = count == 0 ? ENOSPC : errno;
       std::string what = path_ + ": " + std::strerror(error);
-      if (!temporary_.empty()) {
+      if (!temporary_.empty() || (is_new_ && length_ == 0 && ftruncate(fd_, 0) == 0)) {
         throw Error(ErrorCode::write_undone, what + "; nothing was changed");
       }
       if (to_standard_output_ || ftruncate(fd_, length_) != 0) {

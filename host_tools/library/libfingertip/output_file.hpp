@@ -54,6 +54,7 @@ private:
   std::string target_;    /* path_ without symbolic links */
   std::string temporary_; /* beside the target, until finished; empty if written at once */
   int fd_;
+  bool is_new_ = false; /* written at once, where there was no file: none is left where nothing could be written */
   std::int64_t length_ = 0;
 };
 

@@ -85,7 +85,7 @@ public:
 
   bool next(Line &line) override {
     std::size_t end = block_.find(end_, at_);
-    while (end == std::string::npos) {
+    while (end == std::string::npos && block_.size() - at_ <= LINE_MOST_bytes) {
       begin_ += at_;
       block_.erase(0, std::exchange(at_, 0));
       char more[16384];
@@ -124,6 +124,7 @@ public:
 
 private:
   static constexpr std::string_view BYTE_ORDER_MARK = "\xef\xbb\xbf";
+  static constexpr std::size_t LINE_MOST_bytes = 1 << 20; /* a longer one is read as torn */
 
   std::unique_ptr<ByteSource> bytes_;
   std::string block_;       /* the part of them that begins at begin_; read until at_ */

@@ -1,14 +1,11 @@
 #include "libfingertip/error.hpp"
+#include "libfingertip/line_source.hpp"
 #include "tool/doctor/crash.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <elf.h>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <utility>
 
 namespace fingertip {
@@ -25,17 +22,7 @@ template <typename Part> static Part part_at(const std::vector<std::uint8_t> &fi
   return part;
 }
 
-Symbols Symbols::of_file(const std::string &path) {
-  if (std::filesystem::is_directory(path)) {
-    throw Error(ErrorCode::is_folder, path + ": is a folder");
-  }
-  std::ifstream stream(path, std::ios::binary);
-  std::vector<std::uint8_t> file((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
-  if (!stream.is_open() || stream.bad()) {
-    throw Error(ErrorCode::cannot_read, path + ": cannot be read (" + std::strerror(errno) + ")");
-  }
-  return Symbols(std::move(file), path);
-}
+Symbols Symbols::of_file(const std::string &path) { return Symbols(all_bytes(path), path); }
 
 Symbols::Symbols(std::vector<std::uint8_t> file, const std::string &name) : file_(std::move(file)) {
   bool is_elf = file_.size() > EI_DATA && std::memcmp(file_.data(), ELFMAG, SELFMAG) == 0 && file_[EI_CLASS] == ELFCLASS32 &&

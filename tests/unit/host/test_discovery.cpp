@@ -98,7 +98,6 @@ TEST_F(FakeSystem, TheWishedTransport) {
   setenv("FINGERTIP_PORT", "/tmp/pty", 1);
   EXPECT_EQ(port({"", "", Reach::usb}), "");
   EXPECT_EQ(thrown({"/dev/ttyACM0", "", Reach::usb}).code(), ErrorCode::wrong_choice);
-  unsetenv("FINGERTIP_PORT");
 }
 
 TEST_F(FakeSystem, NoneAndSeveralAreErrors) {
@@ -127,5 +126,4 @@ TEST_F(FakeSystem, TheEnvironmentGoesBeforeUsbAndTheArgumentBeforeBoth) {
   EXPECT_EQ(find_in_environment()[0].product, "from FINGERTIP_PORT");
   setenv("FINGERTIP_PORT", "/tmp/a:/tmp/b", 1);
   EXPECT_EQ(error({}), "several fingertips found: /tmp/a, /tmp/b");
-  unsetenv("FINGERTIP_PORT");
 }

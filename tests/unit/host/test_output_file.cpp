@@ -16,14 +16,17 @@ constexpr auto WHEN_FINISHED = OutputFile::Appears::when_finished;
 
 static void write(const std::string &path, const std::string &text) { std::ofstream(path, std::ios::binary) << text; }
 
-/* Nothing: it may be written. */
-static std::optional<ErrorCode> refusal(const std::string &path, bool replace) {
+/* Nothing: it is not. */
+template <typename Action> std::optional<ErrorCode> refused(const Action &action) {
   try {
-    check_output(path, replace);
+    action();
   } catch (const Error &error) {
     return error.code();
   }
   return std::nullopt;
+}
+static std::optional<ErrorCode> refusal(const std::string &path, bool replace) {
+  return refused([&] { check_output(path, replace); });
 }
 
 static long files_in(const std::string &folder) { return std::distance(fs::directory_iterator(folder), fs::directory_iterator()); }
@@ -95,9 +98,9 @@ TEST(OutputFile, OneFileByTwoNames) {
   fs::create_hard_link(folder / "a", folder / "hard");
   fs::create_symlink("a", folder / "soft");
   fs::create_directory_symlink(".", folder / "here");
-  EXPECT_TRUE(is_same_file(folder / "a", folder / "hard"));
-  EXPECT_TRUE(is_same_file(folder / "a", folder / "soft"));
-  EXPECT_TRUE(is_same_file(folder / "a", folder / "here/a"));
+  for (const char *name : {"hard", "soft", "here/a"}) {
+    EXPECT_TRUE(is_same_file(folder / "a", folder / name));
+  }
   EXPECT_TRUE(is_same_file(folder / "new", folder / "./here/new"));
   EXPECT_TRUE(is_same_file("new", "./new"));
   EXPECT_FALSE(is_same_file(folder / "a", folder / "b"));
@@ -113,16 +116,15 @@ TEST(OutputFile, AFullDiskIsAnErrorAndLeavesWholeAppends) {
   const rlimit small = {5000, before.rlim_max};
   OutputFile file(folder / "a", false, OutputFile::Appears::at_once);
   const std::string line(300, 'x');
-  ErrorCode code = ErrorCode::other;
+  std::optional<ErrorCode> code;
   setrlimit(RLIMIT_FSIZE, &small);
-  for (int i = 0; i < 100 && code == ErrorCode::other; i++) {
-    try {
-      file.append(line.data(), line.size());
-    } catch (const Error &error) {
-      code = error.code();
-    }
+  for (int i = 0; i < 100 && !code; i++) {
+    code = refused([&] { file.append(line.data(), line.size()); });
   }
+  const std::string too_long(6000, 'x');
+  EXPECT_THROW(OutputFile(folder / "b", false, OutputFile::Appears::at_once).append(too_long.data(), too_long.size()), Error);
   setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_FALSE(fs::exists(folder / "b"));
   EXPECT_EQ(code, ErrorCode::write_cut);
   EXPECT_EQ(fs::file_size(folder / "a"), 4800u);
 }
