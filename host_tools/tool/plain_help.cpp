@@ -1,6 +1,7 @@
 #include "tool/plain_help.hpp"
 
 #include "libfingertip/text.hpp"
+#include "tool/advice.hpp"
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
@@ -135,6 +136,9 @@ std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
   if (kind == "ArgumentMismatch" && text.find("At Most") != std::string::npos) {
     return text.substr(0, text.find(':')) + " is given twice; give it once";
   }
+  if (kind == "ArgumentMismatch" && text.find(" required ") != std::string::npos) {
+    return text.substr(0, text.find(':')) + " lacks its value";
+  }
   if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError)) {
     /* Its name is the command's. It lists the words from the last to the first. */
     const std::string first = text.substr(text.rfind(' ') + 1);
@@ -164,11 +168,28 @@ void speak_plainly(CLI::App &app) {
   app.formatter(std::make_shared<HelpFormatter>());
   app.failure_message([](const CLI::App *failed, const CLI::Error &error) {
     std::string command = failed->get_name();
+    const std::string program = command.substr(0, command.find(' '));
     for (const CLI::App *chosen : failed->get_subcommands()) {
       command += " " + chosen->get_name();
     }
-    return printable("fingertip: " + problem_of(failed, error) + "; see " + command + " --help") + "\n";
+    return printable(program + ": " + problem_of(failed, error) + "; see " + command + " --help") + "\n";
   });
+}
+
+int run_program(CLI::App &app, int argc, char **argv, const std::function<int()> &run) {
+  speak_plainly(app);
+  const std::string program = app.get_name().substr(0, app.get_name().find(' '));
+  try {
+    app.parse(argc, argv);
+    return run();
+  } catch (const CLI::ParseError &error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const Error &error) {
+    print_error(program.c_str(), error);
+  } catch (const std::exception &error) {
+    print_error(program.c_str(), Error(error.what()));
+  }
+  return 1;
 }
 
 } // namespace fingertip

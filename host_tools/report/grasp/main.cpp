@@ -8,6 +8,7 @@
 #include "report/grasp/fault_trials.hpp"
 #include "report/grasp/textbook.hpp"
 #include "simulation/cell/kind_trial.hpp"
+#include "tool/plain_help.hpp"
 
 #include <CLI/CLI.hpp>
 #include <iostream>
@@ -231,11 +232,11 @@ int run(int argc, char **argv) {
   const auto number = [&](const char *name, double &value, const char *unit, const char *help) {
     return app.add_option(name, value, help)->type_name(unit);
   };
-  number("--later", options.later_ms, "MS", "All frames come later")->check(CLI::NonNegativeNumber);
-  number("--rate", options.rate_Hz, "HZ", "Frames of a fingertip")->check(CLI::Range(1.0, 1600.0))->capture_default_str();
+  number("--later", options.later_ms, "MS", "All frames come later")->check(within(0.0, 1e4));
+  number("--rate", options.rate_Hz, "HZ", "Frames of a fingertip")->check(within(1.0, 1600.0))->capture_default_str();
   app.add_flag("--loadless", options.loadless, "Fingertips do not know their pads: no tangential force");
   number("--still", options.still_s, "S", "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
-      ->check(CLI::PositiveNumber);
+      ->check(within(1e-3, 1e4));
   std::vector<std::string> happenings = {"none", "place", "hand_over"};
   for (const Wrong &wrong : WRONG) {
     happenings.emplace_back(wrong.name);
@@ -244,8 +245,8 @@ int run(int argc, char **argv) {
       ->check(CLI::IsMember(happenings));
   app.add_option("--seed", options.seed, "Another set of grasps; 1 to 999 are there to choose constants by, the report judges by others")
       ->capture_default_str();
-  app.add_option("--count", options.count, "Grasps")->check(CLI::Range(1, 1000000))->capture_default_str();
-  app.add_option("--jobs", options.jobs, "Threads")->check(CLI::Range(1, 64))->capture_default_str();
+  app.add_option("--count", options.count, "Grasps")->check(within(1, 1000000))->capture_default_str();
+  app.add_option("--jobs", options.jobs, "Threads")->check(within(1, 64))->capture_default_str();
   app.add_option("--trace", options.trace, "Instead: all that is known of this grasp, every 2 ms")->type_name("N");
   app.add_flag("--faults", options.faults, "Instead: every fault in every state of a grasp");
   try {

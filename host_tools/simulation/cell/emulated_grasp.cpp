@@ -12,6 +12,7 @@
 #include "simulation/cell/fingertip_cell_world.hpp"
 #include "simulation/cell/gripper_motion.hpp"
 #include "simulation/cell/kind_trial.hpp"
+#include "tool/plain_help.hpp"
 
 extern "C" {
 #include "common/contact_flags.h"
@@ -362,7 +363,7 @@ int main(int argc, char **argv) {
                "fingertip_cell_emulated");
   std::string cache;
   double friction_falls = 0.5;
-  app.add_option("--friction-falls", friction_falls, "By this share")->check(CLI::Range(0.0, 0.9))->capture_default_str();
+  app.add_option("--friction-falls", friction_falls, "By this share")->check(fingertip::within(0.0, 0.9))->capture_default_str();
   app.add_option("--cache", cache, "Folder of the contact tables")->required();
   CLI11_PARSE(app, argc, argv);
   try {

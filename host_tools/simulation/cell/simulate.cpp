@@ -5,7 +5,6 @@
 #include "libfingertip/text.hpp"
 #include "library/pad/table_file.hpp"
 #include "simulation/cell/simulations.hpp"
-#include "tool/advice.hpp"
 #include "tool/plain_help.hpp"
 
 #include <CLI/CLI.hpp>
@@ -71,7 +70,6 @@ int main(int argc, char **argv) {
                "Every program finds them as it finds real ones, and by the names sim:left and sim:right "
                "(sim: for the first). Ctrl-C ends it.",
                "fingertip simulate");
-  speak_plainly(app);
   const auto name_of_any = [](auto one) { return name_of(one); };
   Options options;
   KindOfGrasp &object = options.lift.world.grasp;
@@ -112,14 +110,14 @@ int main(int argc, char **argv) {
   add("--ports", options.ports, "FOLDER",
       "Folder for the ports left, right and gripper, which FINGERTIP_PORT may name; no program finds the fingertips by itself then, and "
       "one at a time may use each");
-  add("--seed", options.seed, "N", "Of gains, noise and places; default 1")->check(CLI::Range(0, 999999999));
+  add("--seed", options.seed, "N", "Of gains, noise and places; default 1")->check(within(0, 999999999));
   add("--gain-spread", options.gain_spread, "SHARE", "Standard deviation between sensors; default 0.1, with --lift 0.05")
       ->check(within(0.0, 0.2));
   add("--seconds", options.seconds, "S", "End after this time")->check(within(0.1, 1e6));
   add("--truth", options.truth, "FILE.csv", "Keeps what is true");
   app.add_flag("--overwrite", options.overwrite, "Replace FILE.csv if it exists");
   add("--cache", options.cache, "FOLDER", "Of contact tables; default: those installed, else ~/.cache/fingertip");
-  for (CLI::Option *option : {add("--fingertips", options.press.fingertips, "N", "How many")->check(CLI::Range(1, 2)),
+  for (CLI::Option *option : {add("--fingertips", options.press.fingertips, "N", "How many")->check(within(1, 2)),
                               add("--weight", options.press.weight_g, "GRAMS", "What is set down")->check(within(20.0, 2000.0))}) {
     option->excludes(lift_flag)->group("Presses")->capture_default_str();
   }
@@ -153,16 +151,11 @@ int main(int argc, char **argv) {
   for (CLI::Option *option : of_lift) {
     option->needs(lift_flag)->group("Lifts");
   }
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError &error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  for (int number_of_signal : {SIGINT, SIGTERM, SIGHUP}) {
-    std::signal(number_of_signal, [](int) { interrupted = 1; });
-  }
-  std::signal(SIGPIPE, SIG_IGN);
-  try {
+  return run_program(app, argc, argv, [&] {
+    for (int number_of_signal : {SIGINT, SIGTERM, SIGHUP}) {
+      std::signal(number_of_signal, [](int) { interrupted = 1; });
+    }
+    std::signal(SIGPIPE, SIG_IGN);
     for (const std::string &text : planned_texts) {
       options.lift.world.planned.push_back(planned(text));
     }
@@ -172,10 +165,5 @@ int main(int argc, char **argv) {
     stiffen(object);
     run(options, is_lift, is_validate);
     return 0;
-  } catch (const Error &error) {
-    print_error("fingertip", error);
-  } catch (const std::runtime_error &error) {
-    print_error("fingertip", Error(error.what()));
-  }
-  return 1;
+  });
 }

@@ -1,6 +1,7 @@
 // The fingertip without a chip: the firmware's own code, compiled for this machine.
 #include "libfingertip/command.hpp"
 #include "libfingertip/error.hpp"
+#include "libfingertip/line_source.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/recording_writer.hpp"
@@ -11,8 +12,8 @@
 #include "simulation/player/native_fingertip.h"
 #include "simulation/player/repeat.h"
 #include "simulation/player/scenario.hpp"
-#include "tool/advice.hpp"
 #include "tool/calibration/from_recording.hpp"
+#include "tool/plain_help.hpp"
 
 extern "C" {
 #include "config/defaults.h"
@@ -24,7 +25,6 @@ extern "C" {
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
-#include <fstream>
 #include <functional>
 #include <optional>
 namespace fingertip {
@@ -73,14 +73,8 @@ private:
 
 // The file's bytes go to the decoder. Throws Error where it cannot be read.
 void feed_file(const std::string &path, Decoder &decoder, const std::function<void(const wire_packet &)> &on_packet) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    throw Error(path + ": cannot read (" + std::strerror(errno) + ")");
-  }
-  char bytes[4096];
-  while (file.read(bytes, sizeof bytes) || file.gcount() > 0) {
-    decoder.feed(reinterpret_cast<const std::uint8_t *>(bytes), static_cast<std::size_t>(file.gcount()), on_packet);
-  }
+  const std::vector<std::uint8_t> bytes = all_bytes(path);
+  decoder.feed(bytes.data(), bytes.size(), on_packet);
 }
 
 std::vector<wire_packet> commands_in(const std::string &path) {
@@ -102,7 +96,7 @@ struct CalibrateOptions {
 // Calibrates like fingertip calibrate --from: the thickness that is found makes the pad's profile.
 int calibrate(const CalibrateOptions &options) {
   check_output(options.commands, options.replace);
-  auto [info, session] = calibrating::gain_session_from(options.placements, "", [](const auto &) {});
+  auto [info, session] = calibrating::gain_session_from(options.placements, "", [](const auto &, double) {});
   calibrating::refuse_unless_good(session.judgement());
   calibration made = session.made(options.force_N, CALIBRATED_s);
   const auto for_profile = pad::thickness_for_profile(info, made);
@@ -354,9 +348,8 @@ int repeat_capture(const std::string &capture) {
 }
 
 int run(int argc, char **argv) {
-  CLI::App app("The fingertip without a chip: the firmware's own code, compiled for this machine");
+  CLI::App app("The fingertip without a chip: the firmware's own code, compiled for this machine", "fingertip_player");
   app.require_subcommand(1);
-  app.get_formatter()->column_width(28);
   const auto option = [](CLI::App *command, const char *name, auto &value, const char *type, const char *help) {
     return command->add_option(name, value, help)->type_name(type);
   };
@@ -371,7 +364,7 @@ int run(int argc, char **argv) {
   CLI::Option *pad = option(player, "--pad", given.pad_mm, "MM", "Thickness of the pad: the firmware estimates tangential force");
   player->add_flag("--from-touch", given.from_touch, "As of fingertip pad")->needs(pad);
   option(player, "--first", given.first, "FILE", "Commands that it is sent first, of fingertip_player calibrate");
-  option(player, "--noise", given.noise, "FACTOR", "Times the datasheet's; default 1")->check(CLI::Range(0.0, 1000.0));
+  option(player, "--noise", given.noise, "FACTOR", "Times the datasheet's; default 1")->check(within(0.0, 1000.0));
   option(player, "--serial", given.serial, "HEX16", "Serial number of the fingertip")
       ->check([](const std::string &text) {
         const bool is_one = text.size() == 16 && text.find_first_not_of("0123456789ABCDEF") == std::string::npos;
@@ -379,7 +372,7 @@ int run(int argc, char **argv) {
       })
       ->capture_default_str();
   option(player, "--seed", given.seed, "N", "Of noise and calibration; default 1");
-  option(player, "--seconds", given.seconds, "S", "Default: to the scenario's end")->check(CLI::Range(0.1, SECONDS_MAX));
+  option(player, "--seconds", given.seconds, "S", "Default: to the scenario's end")->check(within(0.1, SECONDS_MAX));
   player->add_flag("--raw", given.raw, "Record the pressures too");
   option(player, "--raw-bytes", given.raw_bytes, "FILE.ftr", "Keep the bytes of the line too, as of fingertip record");
   option(player, "--commands", given.commands, "FILE", "And those that it was sent, before 0 s");
@@ -389,7 +382,7 @@ int run(int argc, char **argv) {
   CLI::App *calibrater = app.add_subcommand("calibrate", "Judge a weight's placements, as fingertip calibrate does, and write the "
                                                          "commands that bring what it found: play --first");
   option(calibrater, "placements", calibrated.placements, "FILE.csv", "Recording of them, with --raw")->required();
-  option(calibrater, "--force", calibrated.force_N, "N", "That weight, N")->required()->check(CLI::Range(0.1, 100.0));
+  option(calibrater, "--force", calibrated.force_N, "N", "That weight, N")->required()->check(within(0.1, 100.0));
   option(calibrater, "-o,--output", calibrated.commands, "FILE", "The commands")->required();
   option(calibrater, "--overhang", calibrated.overhang_mm, "MM", "Rubber beyond the outer sensors, as of fingertip pad");
   calibrater->add_flag("--overwrite", calibrated.replace, "Replace a file that exists");
@@ -401,22 +394,12 @@ int run(int argc, char **argv) {
          "Bytes of the line (fingertip record --raw-bytes, or the emulator's --capture) with contact and raw packets, "
          "an info packet and a tare")
       ->required();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError &error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  return *player ? play(given) : *calibrater ? calibrate(calibrated) : repeat_capture(capture);
+  return run_program(app, argc, argv, [&] {
+    return *player ? play(given) : *calibrater ? calibrate(calibrated) : repeat_capture(capture);
+  });
 }
 
 } // namespace
 } // namespace fingertip
 
-int main(int argc, char **argv) {
-  try {
-    return fingertip::run(argc, argv);
-  } catch (const fingertip::Error &error) {
-    fingertip::print_error("fingertip_player", error);
-  }
-  return 1;
-}
+int main(int argc, char **argv) { return fingertip::run(argc, argv); }

@@ -7,7 +7,7 @@
 #include "libfingertip/text.hpp"
 #include "simulation/twin/best_gaussian.hpp"
 #include "simulation/twin/scenario_file.hpp"
-#include "tool/advice.hpp"
+#include "tool/plain_help.hpp"
 
 #include <CLI/CLI.hpp>
 #include <atomic>
@@ -196,19 +196,14 @@ std::uint64_t seed_from_text(const std::string &option, const std::string &text)
   return *seed;
 }
 
-int run(int argc, char **argv) {
+} // namespace
+
+int main(int argc, char **argv) {
   Options options;
   std::function<int()> action;
   CLI::App app("Writes what the sensors of a simulated pad feel, for emulator and native pipeline.", "twin");
   app.set_version_flag("--version", "twin " FINGERTIP_VERSION);
   app.require_subcommand(1);
-  app.failure_message([](const CLI::App *failed, const CLI::Error &error) {
-    std::string command = "twin";
-    for (const CLI::App *chosen : failed->get_subcommands()) {
-      command += " " + chosen->get_name();
-    }
-    return printable("twin: " + std::string(error.what()) + "; see " + command + " --help") + "\n";
-  });
   const auto option = [](CLI::App *command, const char *name, auto &value, const char *type, const char *help) {
     return command->add_option(name, value, help)->type_name(type);
   };
@@ -237,9 +232,9 @@ int run(int argc, char **argv) {
                                               "share of the force, and its peak");
   with_contact(fit);
   option(fit, "--force", options.width_force_N, "N", "Normal force")
-      ->check(CLI::Range(ContactTable::FORCE_MIN_N, ContactTable::FORCE_MAX_N))
+      ->check(within(ContactTable::FORCE_MIN_N, ContactTable::FORCE_MAX_N))
       ->capture_default_str();
-  option(fit, "--shore", options.shore_a, "A", "Hardness of the rubber, Shore A; default 15")->check(CLI::Range(SHORE_MIN, SHORE_MAX));
+  option(fit, "--shore", options.shore_a, "A", "Hardness of the rubber, Shore A; default 15")->check(within(SHORE_MIN, SHORE_MAX));
   with_cache(fit);
   fit->callback([&] { action = [&] { return width(options); }; });
 
@@ -274,25 +269,8 @@ int run(int argc, char **argv) {
   with_cache(write);
   write->callback([&] { action = [&] { return scenario(options); }; });
 
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError &error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  catch_signals();
-  return action();
-}
-
-} // namespace
-
-int main(int argc, char **argv) {
-  try {
-    return run(argc, argv);
-  } catch (const Error &error) {
-    print_error("twin", error);
-    return 1;
-  } catch (const std::exception &error) {
-    std::fprintf(stderr, "twin: %s\n", printable(error.what()).c_str());
-    return 1;
-  }
+  return run_program(app, argc, argv, [&] {
+    catch_signals();
+    return action();
+  });
 }

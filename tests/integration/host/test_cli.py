@@ -1,5 +1,6 @@
 """The fingertip command against a fake device: usage test_cli.py FINGERTIP FAKE_DEVICE TIME_KEEPER [unittest arguments]."""
 
+import itertools
 import os
 import pathlib
 import re
@@ -39,22 +40,21 @@ class Usage(CliTest):
             ("", f"a command is missing{missing}"),
             ("touched --port x", f'"touched" is no command{missing}'),
             ("recrod", '"recrod" is no command; is record meant[?] see fingertip --help'),
-            ("moniter", '"moniter" is no command; is monitor meant[?] see fingertip --help'),
             ("inf", '"inf" is no command; is info meant[?] see fingertip --help'),
             ("gripper1", '"gripper1" is no command; is gripper meant[?] see fingertip --help'),
-            ("seet", '"seet" is no command; is set meant[?] see fingertip --help'),
             ("monitor --bogus", '"--bogus" is no option of it; see fingertip monitor --help'),
             ("list --port a", '"--port" is no option of it; see fingertip list --help'),
             ("list a b", '"a" is one word too many; see fingertip list --help'),
             ("info --port a --port b", "--port is given twice; give it once; see fingertip info --help"),
             ("record", r"FILE.csv[|]FILE.mcap[|]- is missing; see fingertip record --help"),
             ("monitor --colour pink", '--colour "pink" is not possible; give auto, truecolour, 256 or plain; see fingertip monitor --help'),
-            ("monitor --colour 0", '--colour "0" is not possible; give auto, truecolour, 256 or plain; see fingertip monitor --help'),
             ("info --transport bluetooth", '--transport "bluetooth" is not possible; give auto, socket, serial or usb; see .*'),
             *((f"record x.csv --seconds={value}", ".*; give a number from 0.001.*") for value in ("nan", "-1", "0", "inf", "1x")),
             *((f"replay x.csv --speed {value}", ".*; give 0.01 to 1000, or max;.*") for value in ("abc", "0", "nan", "-1", "1001")),
             ("set --keep --forget", ".*excludes.*"),
             ("set", "nothing to set; give .*"),
+            ("info --port", "--port lacks its value; see fingertip info --help"),
+            ("set rate=5 osr=256 rate=6", "rate=6: is set twice; set it once"),
             (f"set --port {self.port} rate=0", ".*0.1 to 2000 Hz, or max.*"),  # found before a port is opened
             ("pad --erase --thickness 12", ".*excludes.*"),
         ):
@@ -91,6 +91,8 @@ class Usage(CliTest):
         self.assertNotIn("\x1b", self.error("replay", "--\x1b[31m", status=2))
 
     def test_ports(self):
+        for command, file in itertools.product(("replay", "flash"), (self.folder, "/dev/zero")):
+            self.assertIn("is a folder, a device or a pipe, no file", self.error(command, file))
         self.assertIn("no such port", self.error("info", "--port", self.port))
         self.assertIn("no serial port", self.error("info", "--port", "/dev/null"))
         self.environment["FINGERTIP_PORT"] = self.port + ":" + self.folder
@@ -292,6 +294,8 @@ class Commands(CliTest):
             self.assertEqual(out, "rate=20.500 osr=256 slip_threshold=0.5 slip_window=250 prior=3.1:0.5 limit=0.6\n")
             self.assertEqual(self.run_cli("tare")[0], "tared\n")
             self.assertIn("RPI-RP2", self.run_cli("loader")[0])
+        with self.device("board=native"):
+            self.assertIn("a simulated fingertip has no USB loader", self.error("loader", "--port", self.port))
 
     def test_settings_that_are_kept(self):
         self.environment["FINGERTIP_PORT"] = self.port
@@ -336,11 +340,11 @@ class Commands(CliTest):
             self.assertIn("a pad without end", err)
             self.assertIn("erased", self.run_cli("pad", "--erase")[0])
             self.assertEqual(self.info()["stored"], "nothing")
-            self.assertIn("--thickness goes from 9 to 20 mm", self.error("pad", "--thickness", "8.9", status=2))
             for untold in ([], ["--from-touch"]):
                 self.assertIn("give --thickness MM of the pad's rubber, or calibrate first", self.error("pad", *untold, status=2))
-            for wrong in (["--thickness", "21"], ["--thickness", "12", "--overhang", "200"]):
-                self.assertIn("out of range; give", self.error("pad", *wrong, status=2))
+            for option, takes, wrong in (("--thickness", "9 to 20", ("8.9", "21", "nan")), ("--overhang", "0 to 100", ("200", "nan"))):
+                for value in wrong:
+                    self.assertIn(f'{option} takes {takes} mm, not "{value}"', self.error("pad", f"{option}={value}", status=2))
         with self.device():
             self.assertIn("of scene slip, reports no tangential force; install one of scene grasp", self.error("pad", "--thickness", "12"))
         with self.device("capabilities=15", "refuse=1"):

@@ -10,7 +10,6 @@
 #include "simulation/cell/place.hpp"
 #include "simulation/cell/validated.hpp"
 #include "simulation/player/native_fingertip.h"
-#include "tool/advice.hpp"
 #include "tool/calibration/gain_session.hpp"
 #include "tool/plain_help.hpp"
 
@@ -177,7 +176,6 @@ void keep_truth(const Options &options, const ValidatedPad &pad) {
 
 int run(int argc, char **argv) {
   CLI::App app("Simulates a validation of a fingertip, and records it as `fingertip validate` does.", "simulated_pad");
-  speak_plainly(app);
   Options options;
   options.pad.cache = twin::default_cache_directory();
   app.add_option("-o,--output", options.recording, "The recording")->required()->type_name("FILE.csv");
@@ -196,35 +194,23 @@ int run(int argc, char **argv) {
       ->capture_default_str();
   app.add_option("--cache", options.pad.cache, "Of contact tables")->type_name("FOLDER");
   app.add_flag("--overwrite", options.overwrite, "Replace files that exist");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError &error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  const auto &names = pad_fault_names();
-  options.pad.fault = static_cast<PadFault>(std::find(names.begin(), names.end(), options.fault) - names.begin());
-  if (options.plain) {
-    options.pad.effects = twin::parse_effects("gain");
-  }
-  ValidatedPad pad(options.pad);
-  Play play(options, pad);
-  play.run();
-  if (!options.truth.empty()) {
-    keep_truth(options, pad);
-  }
-  return 0;
+  return run_program(app, argc, argv, [&] {
+    const auto &names = pad_fault_names();
+    options.pad.fault = static_cast<PadFault>(std::find(names.begin(), names.end(), options.fault) - names.begin());
+    if (options.plain) {
+      options.pad.effects = twin::parse_effects("gain");
+    }
+    ValidatedPad pad(options.pad);
+    Play play(options, pad);
+    play.run();
+    if (!options.truth.empty()) {
+      keep_truth(options, pad);
+    }
+    return 0;
+  });
 }
 
 } // namespace
 } // namespace fingertip::cell
 
-int main(int argc, char **argv) {
-  try {
-    return fingertip::cell::run(argc, argv);
-  } catch (const fingertip::Error &error) {
-    fingertip::print_error("simulated_pad", error);
-  } catch (const std::exception &error) {
-    fingertip::print_error("simulated_pad", fingertip::Error(error.what()));
-  }
-  return 1;
-}
+int main(int argc, char **argv) { return fingertip::cell::run(argc, argv); }

@@ -149,7 +149,11 @@ int set(const SetOptions &options) {
   const auto wanted = typed([&] {
     std::vector<WantedSetting> all;
     for (const std::string &text : options.settings) {
-      all.push_back(setting_from_text(text));
+      const WantedSetting one = setting_from_text(text);
+      if (find_in(all, [&](const WantedSetting &other) { return other.setting == one.setting; })) {
+        throw Error(text + ": is set twice; set it once");
+      }
+      all.push_back(one);
     }
     return all;
   });
@@ -291,9 +295,6 @@ int pad_command(const PadOptions &options) {
   if (options.erase) {
     return erase_pad(session);
   }
-  if (options.thickness_mm && *options.thickness_mm < pad::THINNEST_mm) {
-    throw WrongUsage("on less than 9 mm of rubber the tangential force is not accurate enough; --thickness goes from 9 to 20 mm");
-  }
   const pad::Shape shape{thickness_mm(options, info), options.overhang_mm, options.from_touch};
   pad_profile profile = typed([&] { return pad::profile_of(shape, info); });
   const bool ends = shape.overhang_mm >= pad::EDGE_OVERHANG_MIN_mm && shape.overhang_mm <= pad::EDGE_OVERHANG_MAX_mm;
@@ -321,6 +322,9 @@ int pad_command(const PadOptions &options) {
 
 int loader(const Choice &choice) {
   Device device(choice);
+  if (text_field(device.session.info().body.info.board) == "native") {
+    throw Error("a simulated fingertip has no USB loader; Ctrl-C ends `fingertip simulate`");
+  }
   device.session.command(command_loader());
   std::printf("restarting into the USB loader: the drive RPI-RP2 takes a .uf2 file\n");
   return 0;
@@ -367,10 +371,13 @@ void add_pad(CommandLine &line) {
                                [options] { return pad_command(*options); });
   with_port(command, options->choice);
   CLI::Option *thickness = with_value(command, "MM", "--thickness", options->thickness_mm,
-                                      "Thickness of the rubber above the sensors, 9 to 20 mm. Default: as the calibration found it");
+                                      "Thickness of the rubber above the sensors; the tangential force is not accurate enough on less. "
+                                      "Default: as the calibration found it")
+                               ->check(within(pad::THINNEST_mm, double{PAD_THICKNESS_MAX_mm}));
   CLI::Option *overhang = with_value(command, "MM", "--overhang", options->overhang_mm,
-                                     "How far the rubber extends beyond the outer sensors, up to 100 mm; from 3 to 20 mm the effect "
-                                     "of the ends is computed and subtracted. Default: a pad without end");
+                                     "How far the rubber extends beyond the outer sensors; from 3 to 20 mm the effect of the ends is "
+                                     "computed and subtracted. Default: a pad without end")
+                              ->check(within(0.0, double{PAD_OVERHANG_MAX_mm}));
   CLI::Option *from_touch = command->add_flag("--from-touch", options->from_touch,
                                               "Report the change since the first 100 ms of each contact: for pads "
                                               "whose rubber ends within half its thickness of the outer sensors");

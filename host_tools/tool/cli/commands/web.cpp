@@ -1,6 +1,7 @@
 #include "libfingertip/text.hpp"
 #include "tool/cli/command_line.hpp"
 #include "tool/cli/installed_files.hpp"
+#include "tool/plain_help.hpp"
 #include "web/server/page_server.hpp"
 
 #include <cstdio>
@@ -62,7 +63,7 @@ void add_web(CommandLine &line) {
   auto options = std::make_shared<WebOptions>();
   CLI::App *command =
       line.add("web", "Serve the page that shows and operates fingertips in a browser, until Ctrl-C", [options] { return web(*options); });
-  command->add_option("--port", options->port, "TCP port; 0: any that is free; default 8109")->check(CLI::Range(0, 65535))->type_name("N");
+  command->add_option("--port", options->port, "TCP port; 0: any that is free; default 8109")->check(within(0, 65535))->type_name("N");
   with_value(command, "ADDRESS", "--address", options->address, "Address to listen on; default 127.0.0.1: this machine only");
   command->add_flag("--no-browser", options->no_browser, "Only print the address, do not open it");
 }
