@@ -121,9 +121,10 @@ class AsyncFingertip:
             async with contextlib.aclosing(self.__aiter__()) as coming:
                 while not is_whole(taken) and (frame := await anext(coming, None)) is not None:
                     taken.append(frame)
-        except BaseException:
-            self.sync.give_back(taken)
-            raise
+        except BaseException as error:
+            if not (taken and isinstance(error, GoneError)):
+                self.sync.give_back(taken)
+                raise
         return Block(taken)
 
     async def blocks(self, frames: int) -> AsyncIterator[Block]:

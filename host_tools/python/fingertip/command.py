@@ -1,12 +1,15 @@
-"""What the commands share: their errors, their options' ranges, and where they may write."""
+"""What the commands share: their errors, their progress, their options' ranges, and where they may write."""
 
+import contextlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
+from . import host_time
 from .errors import FingertipError, InputError
 
 Path = str | os.PathLike[str]
+WORTH_SHOWING_s, LINES_s = 2.0, 10.0  # of a progress
 
 
 def run_tool(name: str, main: Callable[[list[str]], int]) -> int:
@@ -16,7 +19,7 @@ def run_tool(name: str, main: Callable[[list[str]], int]) -> int:
         sys.stdout.flush()
         return status
     except FingertipError as error:
-        text, status = str(error), getattr(error, "status", 1)
+        text, status = str(error).replace("salvage=True", "--salvage"), getattr(error, "status", 1)
     except KeyboardInterrupt:
         text, status = "interrupted", 1
     except OSError as error:  # other files' are InputErrors
@@ -32,6 +35,27 @@ def check_range(name: str, value: float, low: float, high: float) -> None:
     """Of an option of a command."""
     if not low <= value <= high:  # false for NaN
         raise InputError(f"--{name} {value:.10g} is out of range; give {low:.10g} to {high:.10g}")
+
+
+@contextlib.contextmanager
+def progress(what: str) -> Iterator[Callable[[float], None]]:
+    """Shows a share and, above 1 %, the time that is left, from the third second on: in place on a terminal, else a line every ten seconds."""
+    begun_s = shown_s = host_time.now_s()
+    in_place = sys.stderr.isatty()
+
+    def show(share: float) -> None:
+        nonlocal shown_s
+        now_s = host_time.now_s()
+        if now_s - begun_s < WORTH_SHOWING_s or now_s - shown_s < (0 if in_place else LINES_s):
+            return
+        shown_s = now_s
+        text = f"{what} {100 * share:.0f} %" + (f", {(now_s - begun_s) * (1 / share - 1):.0f} s left" if share > 0.01 else "")
+        print(f"\r\x1b[K{text}" if in_place else text, end="" if in_place else "\n", file=sys.stderr, flush=True)
+
+    try:
+        yield show
+    finally:
+        print("\r\x1b[K" if in_place and shown_s > begun_s else "", end="", file=sys.stderr, flush=True)
 
 
 def reporter(name: str) -> Callable[[str], None]:

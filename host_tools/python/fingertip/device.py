@@ -7,11 +7,11 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterator, Mapping
-from types import TracebackType
 from typing import Any
 
 from . import discovery, host_time, wire
 from .clock import ClockEstimate, host_now_us
+from .closing import Closing
 from .conversation import ANSWER_TIMEOUT_s, Conversation
 from .errors import BadValueError, FingertipError, GoneError, InputError, NoFingertipError, NoFrameError, OtherFingertipError
 from .frames import Block, Edge, Frame
@@ -90,7 +90,7 @@ def setting_commands(given: Given, now: Info) -> list[Body]:
     return commands
 
 
-class Fingertip(Settable):
+class Fingertip(Settable, Closing):
     """A fingertip that streams, in the background, from the moment it is opened.
 
         with Fingertip() as fingertip:
@@ -196,12 +196,6 @@ class Fingertip(Settable):
         for _ in range(FIRST_EXCHANGES):
             self._line.exchange(wire.SetStreams(0))
         self.set_streams(possible if streams is None else streams)
-
-    def __enter__(self) -> "Fingertip":
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
 
     def close(self) -> None:
         """Ends the streams and gives the port free. A waiting reader learns that there are no more frames."""
@@ -334,16 +328,17 @@ class Fingertip(Settable):
         return latest
 
     def read_block(self, frames: int | None = None, seconds: float | None = None) -> Block:
-        """The next frames as arrays: their number (1 to 1048576), or those of this time by the device (above 0). Fewer if it is closed. What was
-        taken when an error or Ctrl-C ends it is there for the next call, or for iteration."""
+        """The next frames as arrays: their number (1 to 1048576), or those of this time by the device (above 0). Fewer if it is closed or gone;
+        the call after that raises GoneError. What was taken when another error or Ctrl-C ends it is there for the next call, or for iteration."""
         is_whole = block_end(frames, seconds)
         taken: list[Frame] = []
         try:
             while not is_whole(taken) and (frame := self._take_frame()) is not None:
                 taken.append(frame)
-        except BaseException:
-            self.give_back(taken)
-            raise
+        except BaseException as error:
+            if not (taken and isinstance(error, GoneError)):
+                self.give_back(taken)
+                raise
         return Block(taken)
 
     def give_back(self, frames: list[Frame]) -> None:
@@ -351,13 +346,9 @@ class Fingertip(Settable):
         self._queue.extendleft(reversed(frames))
 
     def blocks(self, frames: int) -> Iterator[Block]:
-        """Arrays of this number of frames each, without end; the last one may be shorter."""
-        while True:
-            block = self.read_block(frames)
-            if len(block):
-                yield block
-            if len(block) < frames:
-                return
+        """Arrays of this number of frames each, without end; the last one may be shorter. Raises GoneError after that, NoFrameError."""
+        while len(block := self.read_block(frames)):
+            yield block
 
     def on_frames(self, listener: Callable[[], None]) -> None:
         """Called by the reading thread after frames came and when it ends; must be quick."""

@@ -1,6 +1,6 @@
 """Compares a recording with the truth of its scenario.
 
-    fingertip-evaluate RECORDING.csv SCENARIO.csv [--run run.json] -o summary.json
+    fingertip-evaluate RECORDING.csv SCENARIO.csv [--run run.json] -o summary.json [--overwrite]
 
 Scenario time = device time + device_time_zero_s of the run report (0 without one). The truth is taken at each frame's own time, linear
 between the scenario's rows. Frames whose time falls between a row with and a row without contact belong to neither.
@@ -36,7 +36,7 @@ import sys
 
 import numpy as np
 
-from .command import check_output, printable, run_tool
+from .command import check_output, printable, progress, run_tool
 from .files import CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, InputError
 from .files import read_recording, read_run, read_scenario, recorded_devices, restart_rows, write_text
 
@@ -138,17 +138,20 @@ class Comparison:
 
 
 def add_recording_options(parser):
+    parser.add_argument("--overwrite", action="store_true", help="replace the output if it exists")
     parser.add_argument("--salvage", action="store_true", help="skip damaged lines of the recording and print how many")
     parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")
     parser.add_argument("--from", dest="from_s", type=float, default=0.0, metavar="S", help="leave out what is before; since its begin")
     parser.add_argument("--to", dest="to_s", type=float, default=math.inf, metavar="S", help="leave out what is after")
 
 
-def load_recording(options, **how):
+def load_recording(options, columns=None):
     devices = recorded_devices(options.recording)
     if len(devices) > 1 and not options.device:
         raise InputError(f"{options.recording}: holds several fingertips; choose one with --device: {' '.join(devices)}")
-    recording = read_recording(options.recording, options.salvage, options.device, from_s=options.from_s, to_s=options.to_s, **how)
+    part = {"from_s": options.from_s, "to_s": options.to_s}
+    with progress("reading") as show:
+        recording = read_recording(options.recording, options.salvage, options.device, columns, show, **part)
     if recording.skipped_lines:
         print(f"{printable(options.recording)}: {recording.skipped_lines} damaged lines skipped", file=sys.stderr)
     if not recording.end:
@@ -178,7 +181,7 @@ def main(argv):
     parser.add_argument("-o", "--output", required=True, metavar="summary.json")
     add_recording_options(parser)
     options = parser.parse_args(argv)
-    check_output(options.output, options.recording, options.scenario, options.run)
+    check_output(options.output, options.recording, options.scenario, options.run, replace=options.overwrite)
     recording = load_recording(options)
     check_time(recording)
     comparison = Comparison(recording, read_scenario(options.scenario), read_run(options.run))

@@ -196,7 +196,7 @@ class Recording:
     """metadata, columns (name -> array[n], NaN where empty), sensors_Pa and tare_Pa [n][sensor] as the file has them (valid has those that are
     measurements), events and event_lines, their numbers in the file, end; packets, those that are no frame: (type, {field: text});
     line_numbers[n] of the rows in the file; time_us[n] on the recorder's clock, None in a recording of one. An array is made when it is asked for:
-    an hour at 1309 frames a second takes 0.95 GB, and 0.04 more for each column that someone holds. Columns are not to be changed."""
+    an hour at 1300 frames a second takes 0.95 GB, and 0.04 more for each column that someone holds. Columns are not to be changed."""
 
     def __init__(self, reading: "_Reading", skipped_lines: int) -> None:
         assert reading.columns is not None
@@ -580,7 +580,7 @@ def read_recording(
 
     def wrong(number: int, error: ValueError, is_comment: bool = False) -> None:
         what = str(error) if len(str(error)) <= 200 else f"{str(error)[:200]}..."
-        what += "; use --salvage to skip damaged lines" if reading.rows or is_comment else ""
+        what += "; use salvage=True to skip damaged lines" if reading.rows or is_comment else ""
         damaged(InputError(f"{path}:{number}: {what}"), 1, is_comment)
 
     def one(number: int, text: str, torn: bool) -> None:
@@ -599,7 +599,7 @@ def read_recording(
         if last is not None and number > max(last + 1, skipped_to):
             reading.take_rows(wrong)
             lost = number - last - 1
-            damaged(InputError(f"{path}:{number}: {lost} lines are missing before it; use --salvage to go on"), max(0, lost - unplaced))
+            damaged(InputError(f"{path}:{number}: {lost} lines are missing before it; use salvage=True to go on"), max(0, lost - unplaced))
             unplaced = 0
         last = to
 

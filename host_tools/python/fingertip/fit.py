@@ -15,17 +15,17 @@ import re
 import shutil
 import sys
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from .arrays import Firmware, MeasureError, q10, round_half_away, table_of, usable_of
-from .command import check_output, printable, reporter, run_tool
+from .command import check_output, printable, progress, reporter, run_tool
 from .errors import InputError
 from .files import write_text
-from .line import Flag
+from .line import SENSORS_MAX, Flag
 
 FloatArray = npt.NDArray[np.float64]
 Described = str | os.PathLike[str] | Mapping[str, Any]
@@ -33,7 +33,7 @@ Described = str | os.PathLike[str] | Mapping[str, Any]
 UNITS = {"Pa": 1.0, "hPa": 100.0, "kPa": 1000.0, "mbar": 100.0, "bar": 1e5, "psi": 6894.757, "mmHg": 133.322}
 SHAPES = ("undecided", "round", "pulled", "elongated", "two", "none")
 NOISE_Pa = 10.0
-ROWS_AT_ONCE = 4096
+ROWS_AT_ONCE = 512
 MOST_Pa = 1e6  # no such barometer measures more
 ABSOLUTE_Pa = 3e4  # the air is more, and touches are not in the median of all readings
 AIR_Pa = (8e4, 1.1e5)  # absolute pressures at rest, up to 1900 m above the sea
@@ -111,11 +111,15 @@ def read_pad(pad: Described) -> Pad:
             places = np.array(text["places_mm"], float).reshape(-1, 2)
         else:
             columns, rows = int(text["columns"]), int(text["rows"])
+            if not 1 <= columns * rows <= SENSORS_MAX:
+                raise ValueError(f"{columns * rows} sensors, and at most {SENSORS_MAX} are possible")
             nodes = np.column_stack(np.divmod(np.arange(columns * rows), rows))
             places = pitch_mm * (nodes - (np.array([columns, rows]) - 1) / 2)
+        if not (0.01 <= pitch_mm <= 1000 and (np.hypot(*places.T) <= 128 * pitch_mm).all()):
+            raise ValueError(f"pitch_mm {pitch_mm:g} is out of range; give 0.01 to 1000 mm, and places within 128 pitches")
         thickness_mm, overhang_mm = (float(rubber.get(key, 0)) for key in ("thickness_mm", "overhang_mm"))
         return Pad(name, places[:, 0].copy(), places[:, 1].copy(), pitch_mm, thickness_mm, overhang_mm)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, OverflowError, TypeError, ValueError) as error:
         raise InputError(f"{name}: {type(error).__name__} {error}; boards/pads/README.md has what a pad is described by") from None
 
 
@@ -247,6 +251,7 @@ def fit(
     unit: str = "Pa",
     zero_rows: int = 0,
     noise_Pa: float = NOISE_Pa,
+    progress: Callable[[float], None] = lambda share: None,
 ) -> dict[str, npt.NDArray[Any]]:
     """Location, force, their standard deviations, flags, tangential force and shape of pressures [row, sensor] above the zero, NaN where a sensor has
     none. What is unlikely is a UserWarning.
@@ -254,6 +259,7 @@ def fit(
     pad: a name that the tool knows, a file or its content (boards/pads/README.md); tangential force and shape need a rectangle and the rubber's
     thickness. calibration: the same, as calibrate() returns it. time_s [row]: rows follow each other, and are contacts by the firmware's gate;
     without it each is a contact of its own, that is held. zero_rows: number of rows at the beginning that are at rest. noise_Pa: rms of a reading.
+    progress: called now and then with the share that is fitted.
 
     Arrays [row] by the names of a recording's columns, NaN where there is none; flags are of fingertip.Flag; shape is of SHAPES. Each row is fitted
     with the 24 before it in its contact. Raises InputError, with the cause. A row takes a millisecond, or without a thickness 20 us."""
@@ -290,6 +296,7 @@ def fit(
     for some in np.array_split(rows[touched], len(rows) // ROWS_AT_ONCE + 1):
         for name, values in _fit(chip, (array, settings, readings, usable, own), profile, known, some, begins[some]).items():
             found.setdefault(name, np.full(len(rows), np.nan if values.dtype == float else 0, values.dtype))[some] = values
+        progress(some[-1] / len(rows) if len(some) else 0.0)
     found["flags"] |= flags | np.where(touched, int(Flag.CONTACT), 0)
     return found
 
@@ -499,7 +506,8 @@ def main(argv: list[str]) -> int:
         force_N = None if options.weight is None else 9.80665e-3 * options.weight
         text = json.dumps(calibrate(pressures, options.pad, force_N=force_N, **common), indent=1) + "\n"
     else:
-        found = fit(pressures, options.pad, calibration=options.calibration, time_s=time_s, **common)
+        with progress("fitting") as show:
+            found = fit(pressures, options.pad, calibration=options.calibration, time_s=time_s, progress=show, **common)
         columns = ({} if time_s is None else {"t_s": time_s}) | found
         text = "".join(f"{','.join(cells)}\n" for cells in [columns, *zip(*(_texts(values, name) for name, values in columns.items()))])
     write_text(options.output, text) if options.output is not None else sys.stdout.write(text)

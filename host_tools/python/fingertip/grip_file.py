@@ -17,10 +17,10 @@ GRIP_ROW = "# grip: "
 def _grip_values(path: Path, number: int, columns: list[str], cells: list[str]) -> list[Any]:
     if len(cells) != len(columns):
         raise InputError(
-            f"{path}:{number}: {len(cells)} columns of the gripper where its header has {len(columns)}; use --salvage to skip the line"
+            f"{path}:{number}: {len(cells)} columns of the gripper where its header has {len(columns)}; use salvage=True to skip the line"
         )
     if cells[columns.index("state")] not in GRIP_STATES:
-        raise InputError(f'{path}:{number}: state is "{cells[columns.index("state")]}"; use --salvage to skip the line')
+        raise InputError(f'{path}:{number}: state is "{cells[columns.index("state")]}"; use salvage=True to skip the line')
     return [cell if name in GRIP_WORDS else number_of(path, number, name, cell, name != "time_us") for name, cell in zip(columns, cells)]
 
 
@@ -39,7 +39,7 @@ def read_grip(path: Path, salvage: bool = False) -> dict[str, Any]:
             continue
         try:
             if torn:
-                raise InputError(f"{path}:{number}: the last line is torn; use --salvage to skip the line")
+                raise InputError(f"{path}:{number}: the last line is torn; use salvage=True to skip the line")
             rows.append(_grip_values(path, number, columns, cells))
         except InputError:
             if not salvage:

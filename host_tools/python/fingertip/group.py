@@ -3,11 +3,12 @@
 import contextlib
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType, TracebackType
+from types import MappingProxyType
 from typing import Any
 
 from . import discovery, host_time
 from .clock import host_now_us
+from .closing import Closing
 from .device import Fingertip
 from .errors import BadValueError, FingertipError, InputError, NoFingertipError, NoFrameError
 from .frames import Frame
@@ -39,7 +40,7 @@ class _Side:
         """The others go on."""
 
 
-class Fingertips:
+class Fingertips(Closing):
     """Several fingertips, whose frames come in order of host_us, the host's clock that they share.
 
         with Fingertips() as fingertips:
@@ -85,12 +86,6 @@ class Fingertips:
     def by_serial(self) -> Mapping[str, Fingertip]:
         return MappingProxyType(self._opened)
 
-    def __enter__(self) -> "Fingertips":
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
-
     def close(self) -> None:
         self._stack.close()
 
@@ -128,24 +123,28 @@ class Fingertips:
         fingertips = list(self._opened.values())
         heads: list[Frame | None] = [None] * len(fingertips)
         heard_s = [host_time.now_s()] * len(fingertips)
-        while True:
-            self._news.clear()
-            for i, fingertip in enumerate(fingertips):
-                if heads[i] is None:
-                    heads[i] = fingertip.take_one()
-                    if heads[i] or fingertip.is_returning:
-                        heard_s[i] = host_time.now_s()
-                    elif host_time.now_s() - heard_s[i] > fingertip.patience_s:
-                        raise NoFrameError(f"{fingertip.description}: no frame in {fingertip.patience_s:g} s")
-            there = [(frame.host_us, i) for i, frame in enumerate(heads) if frame]
-            if there:
-                host_us, first = min(there)
-                frame = heads[first]
-                if frame and (len(there) == len(fingertips) or host_now_us() - host_us > LATE_us):
-                    heads[first] = None
-                    yield frame
-                    continue
-            if not there and all(fingertip.is_closed for fingertip in fingertips):
-                return
-            if not self._news.is_set():
-                self._news.wait(0.02)
+        try:
+            while True:
+                self._news.clear()
+                for i, fingertip in enumerate(fingertips):
+                    if heads[i] is None:
+                        heads[i] = fingertip.take_one()
+                        if heads[i] or fingertip.is_returning:
+                            heard_s[i] = host_time.now_s()
+                        elif host_time.now_s() - heard_s[i] > fingertip.patience_s:
+                            raise NoFrameError(f"{fingertip.description}: no frame in {fingertip.patience_s:g} s")
+                there = [(frame.host_us, i) for i, frame in enumerate(heads) if frame]
+                if there:
+                    host_us, first = min(there)
+                    frame = heads[first]
+                    if frame and (len(there) == len(fingertips) or host_now_us() - host_us > LATE_us):
+                        heads[first] = None
+                        yield frame
+                        continue
+                if not there and all(fingertip.is_closed for fingertip in fingertips):
+                    return
+                if not self._news.is_set():
+                    self._news.wait(0.02)
+        finally:  # those that were not taken are there for the next iteration
+            for fingertip, head in zip(fingertips, heads):
+                fingertip.give_back([head] if head else [])

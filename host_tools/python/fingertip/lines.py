@@ -67,5 +67,7 @@ class LineFile:
     def close(self) -> None:
         try:
             self._file.close()
+            if not self._length and os.path.isfile(self.path):  # nothing could be written
+                os.remove(self.path)
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None

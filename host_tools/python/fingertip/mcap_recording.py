@@ -333,7 +333,7 @@ class McapLineReader:
         self._has_header = self._is_torn = self._has_any = False
 
     def _damaged(self, name: str, error: ValueError) -> Damaged:
-        text = f"a damaged message {name} ({error}), or one of another version of the tool; use --salvage to skip it"
+        text = f"a damaged message {name} ({error}), or one of another version of the tool; use salvage=True to skip it"
         return Damaged(f"{self.path}: {text}")
 
     def items(self) -> Iterator[Line | Contacts | Damaged | Skipped]:
@@ -349,7 +349,7 @@ class McapLineReader:
         if not self._has_any:
             raise InputError(f"{self.path}: no recording of a fingertip; give one that fingertip has written")
         if self._is_torn:
-            yield Damaged(f"{self.path}: the last chunk is torn; use --salvage to do without")
+            yield Damaged(f"{self.path}: the last chunk is torn; use salvage=True to do without")
 
     def _ordered(self) -> Iterator[Line | Contacts | Damaged | Skipped]:
         """What is in the file, each line behind those before it."""
@@ -462,7 +462,7 @@ class McapLineReader:
                             yield from self._messages(head + file.read(length))
                     except damage as error:
                         what = "it ends within a field" if isinstance(error, struct_error) else error
-                        yield Damaged(f"{self.path}: damaged at byte {at} ({what}); use --salvage to skip the chunk")
+                        yield Damaged(f"{self.path}: damaged at byte {at} ({what}); use salvage=True to skip the chunk")
                     end = summary if after and head[0] == _DATA_END else at + 9 + length
                     inside = bisect.bisect(places, at)
                     if inside < len(places) and places[inside] < end:

@@ -2,7 +2,7 @@
 Of a grasp it draws wanted and measured force, load, width and state, unless --device chooses one of its fingertips.
 With --beside it draws what another fingertip of the recording measured of the same scenario, for example before a calibration.
 
-    fingertip-plot RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png
+    fingertip-plot RECORDING.csv [--truth SCENARIO.csv] [--run run.json] -o FILE.png [--overwrite]
 """
 
 import argparse
@@ -19,7 +19,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import FancyBboxPatch
 
-from . import host_time
 from .command import check_output, run_tool
 from .evaluate import Comparison, add_recording_options, check_time, load_recording
 from .files import FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError
@@ -34,7 +33,6 @@ ABOVE = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.2, "
 RIM_mm = 6.0
 POINTS = 4000  # that are drawn of a curve, some four for each pixel
 STATES = (FIT_VALID, WARNINGS, SLIP, TANGENTIAL_VALID, MOVING, SLIDING)  # that curves break at, or marks show
-WORTH_SHOWING_s, LINES_s = 2.0, 10.0
 # All that a picture needs: 250 000 rows of these are 30 MB, of all columns 130.
 COLUMNS = ("t_us", "frame", "flags", "x_mm", "y_mm", "force_N", "qx_N", "qy_N", "q_sd_N", "tangential_ratio")
 GRASP_COLUMNS = ("t_us", "frame", "flags", "force_N")
@@ -70,22 +68,6 @@ def thinned(recording, rows):
     return rows[
         np.unique(np.concatenate((first + force.argmin(axis=1), first + force.argmax(axis=1), change, change + 1, [len(rows) - 1])))
     ]
-
-
-def progress():
-    """Shows a share and, above 1 %, the time that is left, from the third second on: in place on a terminal, else a line every ten seconds."""
-    begun_s = shown_s = host_time.now_s()
-
-    def show(share):
-        nonlocal shown_s
-        now_s = host_time.now_s()
-        if now_s - begun_s < WORTH_SHOWING_s or now_s - shown_s < (0 if sys.stderr.isatty() else LINES_s):
-            return
-        shown_s = now_s
-        text = f"reading {100 * share:.0f} %" + (f", {(now_s - begun_s) * (1 / share - 1):.0f} s left" if share > 0.01 else "")
-        print(f"\r\x1b[K{text}" if sys.stderr.isatty() else text, end="" if sys.stderr.isatty() else "\n", file=sys.stderr, flush=True)
-
-    return show
 
 
 def continuous_time_s(recording, rows):
@@ -371,7 +353,7 @@ def main(argv):
         raise InputError("--beside compares with a truth; give it with --truth SCENARIO.csv")
     if not options.output.lower().endswith(".png"):
         raise InputError(f"{options.output}: no name of a picture; give one that ends in .png")
-    check_output(options.output, options.recording, options.truth, options.run, options.beside_run)
+    check_output(options.output, options.recording, options.truth, options.run, options.beside_run, replace=options.overwrite)
     if not options.device and not options.truth and len(recorded_devices(options.recording)) == 2:
         grip = read_grip(options.recording, options.salvage)
         if grip:
@@ -384,7 +366,7 @@ def main(argv):
             return 0
     run = read_run(options.run)
     truth = read_scenario(options.truth) if options.truth else None
-    recording = load_recording(options, columns=COMPARED_COLUMNS if truth else COLUMNS, progress=progress())
+    recording = load_recording(options, columns=COMPARED_COLUMNS if truth else COLUMNS)
     if truth:
         check_time(recording)
     comparison = Comparison(recording, truth, run) if truth else None

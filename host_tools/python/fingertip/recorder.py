@@ -495,7 +495,7 @@ def main(argv):
     bound = "no recording if two hosts' clocks are, or by chrony's own estimate may be, further apart; default 5000"
     add("--clock-bound-us", type=float, default=5000.0, metavar="US", help=bound)
     add("--undisciplined", action="store_true", help="take hosts whose clock nothing keeps, too")
-    add("--replace", action="store_true", help="over a file that exists")
+    add("--overwrite", action="store_true", help="replace the file if it exists")
     add("--json", action="store_true", help="the counts as JSON on stdout")
     add_session_options(parser)
     options = parser.parse_args(argv)
@@ -504,7 +504,7 @@ def main(argv):
         check_range(name, getattr(options, name), 0, 86400)
     check_range("seconds", options.seconds, 0, math.inf)
     check_range("clock-bound-us", options.clock_bound_us, 0, 1e9)
-    check_output(options.file)
+    check_output(options.file, replace=options.overwrite)
     report = reporter("fingertip-recorder")
 
     with open_session(options, report=report) as session:
@@ -512,7 +512,7 @@ def main(argv):
         infos = find(session, options.serial, options.expect, options.wait)
         notes = judge_clocks(session, list(infos), options.clock_bound_us, options.undisciplined)
         extra = {f"{number}/host_clock": notes[serial] for number, serial in enumerate(infos)}
-        recording = Recording(session, options.file, list(infos.values()), options.replace, extra, report)
+        recording = Recording(session, options.file, list(infos.values()), options.overwrite, extra, report)
         report(f"{options.file}: {', '.join(infos)}")
         recording.run(options.seconds, ended, options.patience)
     figures = recording.figures()

@@ -7,10 +7,10 @@ import math
 import os
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from types import TracebackType
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol
 
 from .clock import ClockEstimate, host_now_us
+from .closing import Closing
 from .errors import InputError
 from .frames import Q10
 from .line import CONTACT_COLUMNS, INFO_KEYS, LATER_COLUMNS, RAW_COLUMNS, SENSOR_LISTS
@@ -219,10 +219,7 @@ class Recorder(Protocol):
     def close(self, reason: str = "closed") -> None: ...
 
 
-Writer = TypeVar("Writer", bound="_Writer")
-
-
-class _Writer:
+class _Writer(Closing):
     """What writers of either format share: a file, its lock, the fingertips in it, and how it ends."""
 
     def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
@@ -285,12 +282,6 @@ class _Writer:
     def frames(self) -> int:
         """Rows until now."""
         return sum(member.frames for member in self._members)
-
-    def __enter__(self: Writer) -> Writer:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
 
 
 class RecordingWriter(_Writer):

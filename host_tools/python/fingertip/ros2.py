@@ -14,10 +14,10 @@ import math
 import os
 import threading
 from collections.abc import Callable
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from . import host_time
+from .closing import Closing
 from .command import check_range, run_tool
 from .device import Fingertip
 from .errors import BadValueError, FingertipError
@@ -83,7 +83,7 @@ class _Device:
         self.is_gone = False
 
 
-class Publisher:
+class Publisher(Closing):
     """The topics of fingertips, and /diagnostics. domain: as ROS_DOMAIN_ID has it, if not given. frame() may be called from a thread for each
     fingertip. Raises BadValueError, InputError."""
 
@@ -99,12 +99,6 @@ class Publisher:
         self._diagnostics = self._topic("/diagnostics", DIAGNOSTICS_TYPE)
         self._lock = threading.Lock()
         self._devices: dict[str, _Device] = {}
-
-    def __enter__(self) -> "Publisher":
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
 
     def close(self) -> None:
         """The topics vanish, once all is acknowledged, or a second later. sent and refused stay."""

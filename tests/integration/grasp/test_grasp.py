@@ -442,7 +442,7 @@ class Recorded(GraspTest):
         picture = os.path.join(self.folder, "grasp.png")
 
         def plot(*options, status=0):
-            words = [sys.executable, PYTHON_TOOLS, "plot", self.csv, *options, "-o", picture]
+            words = [sys.executable, PYTHON_TOOLS, "plot", self.csv, *options, "-o", picture, "--overwrite"]
             done = subprocess.run(words, capture_output=True, text=True, env=self.environment, timeout=PLOT_PATIENCE_s)
             self.assertEqual(done.returncode, status, done.stderr)
             return done.stdout + done.stderr

@@ -35,8 +35,7 @@ class Player(unittest.TestCase):
 
     def evaluated(self, recording):
         summary = self.folder / "summary.json"
-        summary.unlink(missing_ok=True)
-        must(sys.executable, PYTHON, "evaluate", recording, self.scenario, "-o", summary)
+        must(sys.executable, PYTHON, "evaluate", recording, self.scenario, "-o", summary, "--overwrite")
         return json.loads(summary.read_text())
 
     def refused(self, *arguments):
@@ -112,11 +111,7 @@ class Player(unittest.TestCase):
         self.assertIn("check the path", self.refused("play", self.folder / "missing.csv", "-o", self.folder / "never.csv"))
 
     def test_wrong_options(self):
-        for options, reason in (
-            ("--osr 300", "256"),
-            ("--pad 3", "5 to 20 mm"),
-            ("--set slip_window=5000", "1000"),
-        ):
+        for options, reason in (("--osr 300", "256"), ("--pad 3", "5 to 20 mm"), ("--set slip_window=5000", "1000")):
             self.assertIn(reason, self.refused("play", self.scenario, "-o", self.folder / "never.csv", *options.split()))
 
     def test_what_calibrates_nothing_is_refused(self):

@@ -18,7 +18,7 @@ FINGERTIP = os.environ["FINGERTIP_TOOL"] = os.path.abspath(sys.argv.pop())
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python")]
 import fingertip  # noqa: E402
-from fingertip.fit import SHAPES, read_pad  # noqa: E402
+from fingertip.fit import SHAPES, firmware, read_pad  # noqa: E402
 from fingertip.line import WARNINGS, Flag  # noqa: E402
 
 PAD = read_pad("2x4")
@@ -124,7 +124,8 @@ class Fit(unittest.TestCase):
         gains = np.exp(0.15 * np.random.default_rng(3).normal(size=8))
         found = fingertip.calibrate(gains * presses(PAD, 40, 3.6, seed=4)[2], "2x4", force_N=2.0)
         x_mm, y_mm, readings_Pa = presses(PAD, 200, 3.6, seed=5)
-        before, after = (fingertip.fit(gains * readings_Pa, "2x4", calibration=known) for known in (None, found))
+        told = {"progress": lambda share: self.assertEqual(share, 0.995)}
+        before, after = (fingertip.fit(gains * readings_Pa, "2x4", calibration=known, **told) for known in (None, found))
         self.assertLess(off_mm(after, x_mm, y_mm), 0.4 * off_mm(before, x_mm, y_mm))
         self.assertAlmostEqual(np.median(after["force_N"]), 2.0, delta=0.1)
         self.assertLess((after["flags"] & WARNINGS > 0).mean(), 0.5 * (before["flags"] & WARNINGS > 0).mean())
@@ -148,6 +149,8 @@ class Fit(unittest.TestCase):
             (readings_Pa[:, :7], "2x4", {}, "10 x 7, and pad 2x4 has 8 sensors"),
             (readings_Pa, "2x5", {}, "no such pad; give 2x4, 3x5, 4x4"),
             (readings_Pa, {"columns": 2, "rows": 4}, {}, "KeyError 'pitch_mm'"),
+            (readings_Pa, {"pitch_mm": np.nan, "columns": 2, "rows": 4}, {}, "pitch_mm nan is out of range"),
+            (readings_Pa, {"pitch_mm": 9, "columns": 1e9, "rows": 4}, {}, "4000000000 sensors, and at most 36"),
             (readings_Pa / 1000, "2x4", {}, "below six times the noise"),
             (readings_Pa, "2x4", {"unit": "bar"}, "more than such sensors measure"),
             (readings_Pa, "2x4", {"unit": "Torr"}, "is no unit; give one of Pa"),
@@ -157,6 +160,9 @@ class Fit(unittest.TestCase):
         ):
             with self.subTest(words), self.assertRaisesRegex(fingertip.InputError, words):
                 fingertip.fit(values, pad, **more)
+        for pitch_mm in (0.0, np.nan, 1e30):
+            with self.subTest(pitch_mm), self.assertRaisesRegex(fingertip.InputError, "pitch_mm, are none of a pad"):
+                firmware().calibrate(PAD.x_mm, PAD.y_mm, pitch_mm, t_s[None], series_Pa[None], 10.0)
         for values, more, words in (
             (series_Pa + 5 * np.vstack([rest_Pa, rest_Pa]), {"zero_rows": 10}, "readings scatter by 2. Pa from row to row"),
             (series_Pa / 100, {"noise_Pa": 1.0}, "that of a few grams"),

@@ -23,7 +23,7 @@ import numpy as np
 TOOLS = pathlib.Path(__file__).resolve().parents[3] / "host_tools" / "python"
 sys.path.insert(0, str(TOOLS))
 
-from fingertip import Flag, cells, files  # noqa: E402
+from fingertip import Flag, cells, command, files  # noqa: E402
 from fingertip import plot  # noqa: E402
 from fingertip.columns import Columns  # noqa: E402
 from fingertip.wire import Health  # noqa: E402
@@ -144,7 +144,7 @@ class ToolTest(unittest.TestCase):
 
     def summary(self, recording, scenario, *arguments):
         output = self.folder / "summary.json"
-        self.tool("evaluate", recording, scenario, "-o", output, *arguments)
+        self.tool("evaluate", recording, scenario, "-o", output, "--overwrite", *arguments)
         return json.loads(output.read_text(encoding="utf-8"))
 
 
@@ -322,7 +322,7 @@ class Evaluation(ToolTest):
     def assert_restart(self, recording, scenario, frame):
         lines = recording.read_text(encoding="utf-8").split("\n")
         line = 2 + frame + next(at for at, text in enumerate(lines) if text.startswith("t_us,"))
-        self.tool("plot", recording, "-o", self.folder / "restarted.png")
+        self.tool("plot", recording, "-o", self.folder / "restarted.png", "--overwrite")
         for arguments in (("evaluate", recording, scenario), ("plot", recording, "--truth", scenario)):
             err = self.error(*arguments, "--run", self.run_report(), "-o", self.folder / "p.png")
             self.assertIn(f"{recording}:{line}: the fingertip restarted here; ", err)
@@ -525,8 +525,8 @@ class TangentialLoad(ToolTest):
 class Plots(ToolTest):
     def test_progress_is_a_line_every_ten_seconds(self):
         clock = iter(range(0, 100, 4))
-        with mock.patch.object(plot.host_time, "now_s", lambda: next(clock)), contextlib.redirect_stderr(io.StringIO()) as told:
-            show = plot.progress()
+        now_s = mock.patch.object(command.host_time, "now_s", lambda: next(clock))
+        with now_s, contextlib.redirect_stderr(io.StringIO()) as told, command.progress("reading") as show:
             for tenth in range(10):
                 show(max(tenth - 2, 0) / 10)
         self.assertEqual(told.getvalue(), "reading 0 %\nreading 30 %, 56 s left\nreading 60 %, 24 s left\n")
@@ -597,7 +597,9 @@ class Plots(ToolTest):
             self.assertIn(expected, self.error("plot", recording, "-o", self.folder / name))
         full = self.folder / "full.png"
         full.symlink_to("/dev/full")
-        self.assertIn("No space left on device; choose another place", self.error("plot", recording, "-o", full))
+        self.assertIn("exists; give --overwrite", self.error("plot", recording, "-o", full))
+        self.assertIn("exists; give --overwrite", self.error("evaluate", recording, recording, "-o", full))
+        self.assertIn("No space left on device; choose another place", self.error("plot", recording, "-o", full, "--overwrite"))
         self.assertEqual({path.name for path in self.folder.iterdir()}, {"demo.csv", "recording.csv", "d.png", "full.png"})
 
 

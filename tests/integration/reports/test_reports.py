@@ -74,10 +74,7 @@ REPORTS = {
         "met": ("one_called_two_percent",),
         "missed": ("two_right_percent_8mm",),
         "open": "cycles_core1_max",
-        "lines": (
-            "| two_right_percent_8mm | 59 | >= 90 | MISSED |",
-            "| two, 12 mm, 3:1 | 0 | 0 | 0 | 0 | 40 | 60 | 59 | 0.2 | 0.9 |",
-        ),
+        "lines": ("| two_right_percent_8mm | 59 | >= 90 | MISSED |", "| two, 12 mm, 3:1 | 0 | 0 | 0 | 0 | 40 | 60 | 59 | 0.2 | 0.9 |"),
         "not_built": "cycles",
     },
 }
