@@ -122,8 +122,6 @@ PageServer::PageServer(const fs::path &folder, const std::string &address, unsig
   }
 }
 
-PageServer::~PageServer() = default;
-
 HttpAnswer PageServer::answer(const HttpRequest &request) {
   const std::string host = host_of(request.header("host"));
   const std::string cookie = "fingertip-" + std::to_string(server_->port()) + "=" + token_;

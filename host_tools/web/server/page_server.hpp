@@ -26,7 +26,6 @@ class PageServer {
 public:
   /* port 0: any that is free. Listens when this returns; answers in serve. */
   PageServer(const std::filesystem::path &folder, const std::string &address, unsigned port);
-  ~PageServer();
 
   /* For the browser: http://127.0.0.1:8109/?token=...; no token where it passes on no fingertips */
   const std::string &url() const { return url_; }

@@ -142,9 +142,6 @@ private:
   std::string client_;
 };
 
-Simulations::Simulations() = default;
-Simulations::~Simulations() = default;
-
 bool Simulations::is_for(const std::string &path) { return path == PATH || path.rfind(std::string(PATH) + "/", 0) == 0; }
 
 bool Simulations::is_from_page(const HttpRequest &request) {

@@ -25,9 +25,6 @@ public:
   static constexpr const char *PATH = "/simulated";
   static constexpr std::size_t MOST_LINES = 16;
 
-  Simulations();
-  ~Simulations();
-
   /* Of a path for which is_for is true. */
   HttpAnswer answer(const HttpRequest &request);
   static bool is_for(const std::string &path);
