@@ -655,6 +655,7 @@ class Everyone(PageTest):
         page.run("[1, 2].forEach(() => document.querySelector('dialog form').requestSubmit())")  # Enter, twice
         page.until("!document.querySelector('dialog')")
         self.assertEqual(page.run("fingertip.fingertips[0].taps.size"), 1)
+        self.assertTrue(page.run("!dispatchEvent(new Event('beforeunload', {cancelable: true}))"))
         page.until(f"{at}.closest('.doings')")
         enter("Stop")
         self.browser.saved(".csv")

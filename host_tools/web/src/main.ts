@@ -7,6 +7,7 @@
  *   pictures    drawn since the page was loaded
  *   ready_ms    performance.now() when the first was drawn; 0 before
  */
+import { fetched } from '../wasm/module.mjs';
 import { loadCore } from './core';
 import type { Fingertip } from './model/fingertip';
 import { App } from './steps/app';
@@ -15,22 +16,8 @@ import { element, wordsOf } from './view/elements';
 import { keepFocus } from './view/focus';
 import { View } from './view/view';
 
-interface Console {
-  readonly fingertips: readonly Fingertip[];
-  readonly pictures: number;
-  readonly ready_ms: number;
-}
-
 declare global {
-  var fingertip: Console;
-}
-
-async function fetchCore(): Promise<void> {
-  const library = await fetch(new URL('wasm/core.wasm', document.baseURI));
-  if (!library.ok) {
-    throw new Error(`the server answers ${library.status}`);
-  }
-  await loadCore(await library.arrayBuffer());
+  var fingertip: { readonly fingertips: readonly Fingertip[]; readonly pictures: number; ready_ms: number };
 }
 
 function start(): void {
@@ -43,21 +30,22 @@ function start(): void {
   });
   app.notice = (text, kind) => view.notice(text, kind);
   keepFocus();
-  let ready_ms = 0;
+  // A recording that is not ended is lost with the page.
+  addEventListener('beforeunload', (event) => app.recorders.size > 0 && event.preventDefault());
   globalThis.fingertip = {
     fingertips: app.fingertips,
     get pictures() {
       return view.pictures;
     },
-    get ready_ms() {
-      return ready_ms;
-    },
+    ready_ms: 0,
   };
-  requestAnimationFrame(() => (ready_ms = performance.now()));
+  requestAnimationFrame(() => (fingertip.ready_ms = performance.now()));
   app.start();
 }
 
-const problem = await fetchCore().then(() => null, wordsOf);
+const problem = await fetched('wasm/core.wasm')
+  .then(loadCore)
+  .then(() => null, wordsOf);
 if (problem === null) {
   start();
 } else {

@@ -1,4 +1,4 @@
-// The tool's calibrations and its doctor for the page (src/judges/judges.ts explains each). Packets and texts come in by room(), answers go
+// The tool's calibrations and its doctor for the page (judges.mjs explains each). Packets and texts come in by room(), answers go
 // out as JSON by answer_at(). The page frees the sessions. Errors are exceptions (exceptions.cpp).
 #include "libfingertip/error.hpp"
 #include "tool/calibration/gain_session.hpp"

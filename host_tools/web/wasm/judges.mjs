@@ -1,5 +1,5 @@
 // The tool's judgement from judges.wasm, host_tools/tool/calibration and host_tools/tool/doctor: the same numbers, bounds and sentences as
-// `fingertip calibrate` and `fingertip doctor`. For src/judges.ts and for node.
+// `fingertip calibrate` and `fingertip doctor`. For src/steps and for node.
 //
 // A fingertip's packets go in as frames: the bytes of one frame of the line, COBS encoded, without
 // its delimiter. An exception of C++ becomes a WasmError, whose message states what to do.
@@ -124,10 +124,10 @@ class Doctor extends Session {
 /**
  * From the bytes of judges.wasm. gains: from placements of one weight; pulls: the tangential scale from pulls of known_N. Both throw where
  * the firmware cannot.
- * @param {BufferSource} bytes
+ * @param {BufferSource | Promise<BufferSource>} bytes
  */
 export async function load(bytes) {
-  const wasm = await start(await WebAssembly.compile(bytes));
+  const wasm = await start(await WebAssembly.compile(await bytes));
   return {
     gains(info_frame) {
       give(wasm, info_frame);

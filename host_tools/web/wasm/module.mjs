@@ -14,6 +14,18 @@ export class FirmwareLeft extends Error {
 }
 
 /**
+ * The bytes of one of the page's files.
+ * @param {string} url
+ */
+export async function fetched(url) {
+  const response = await fetch(url);
+  if (!response.ok) {
+    throw new WasmError(`${url}: the server answers ${response.status}`);
+  }
+  return response.arrayBuffer();
+}
+
+/**
  * An instance of a compiled module: its exports, ready to be called. unpack: what core.wasm wants.
  * @param {WebAssembly.Module} module
  * @param {((packed: Uint8Array, size: number) => Uint8Array) | null} unpack
@@ -111,5 +123,5 @@ export async function start(module, unpack = null) {
       lent.forEach((at) => call('free', at));
     }
   };
-  return { call, bytes, words, doubles, lend, textAt, size_bytes: () => exports.memory.buffer.byteLength };
+  return { call, bytes, words, doubles, lend, textAt };
 }

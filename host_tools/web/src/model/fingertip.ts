@@ -67,8 +67,6 @@ interface Waiting {
   failed: (error: Error) => void;
 }
 
-let fingertips_made = 0;
-
 /** What a calibration under way has found. wanted: the best next place; gain: [sensor], empty as long as they are unknown. */
 export interface Found {
   readonly placements: readonly { x_mm: number; y_mm: number; kept: boolean }[];
@@ -77,8 +75,6 @@ export interface Found {
 }
 
 export class Fingertip {
-  /** Its number on this page, from 1 on. */
-  readonly id = ++fingertips_made;
   state: FingertipState = 'opening';
   /** Why it is closed, and what to do. */
   why = '';

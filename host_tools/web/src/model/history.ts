@@ -30,7 +30,6 @@ export class History {
   readonly sensor_count: number;
   /** Device time, s; where the fingertip restarted it goes on from before. Never falls. */
   readonly t_s: Float64Array;
-  readonly frame: Uint32Array;
   /** contact_flags.h; of the raw packet where no contact packet came, without those of quantities. */
   readonly flags: Uint32Array;
   /** Frames that are missing right before this one. */
@@ -51,13 +50,13 @@ export class History {
   private next = 0;
   private offset_s = 0;
   private newest_us = 0;
+  private newest_frame = 0;
   private readonly fields: { field: ContactField; flag: number; column: Float32Array }[];
 
   constructor(sensor_count: number, capacity = HISTORY_ROWS) {
     this.capacity = capacity;
     this.sensor_count = sensor_count;
     this.t_s = new Float64Array(capacity);
-    this.frame = new Uint32Array(capacity);
     this.flags = new Uint32Array(capacity);
     this.lost = new Uint32Array(capacity);
     this.valid = new Float64Array(capacity);
@@ -147,23 +146,23 @@ export class History {
     if (this.next > this.oldest) {
       const newest = (this.next - 1) % this.capacity;
       const newest_s = this.t_s[newest];
-      if (this.frame[newest] === frame && this.newest_us === t_us) {
+      if (this.newest_frame === frame && this.newest_us === t_us) {
         return newest;
       }
       if (t_s < newest_s) {
         this.offset_s += newest_s - t_s + this.gap_s; // it restarted
         t_s = newest_s + this.gap_s;
       } else {
-        lost = Math.max(0, ((frame - this.frame[newest]) | 0) - 1);
+        lost = Math.max(0, ((frame - this.newest_frame) | 0) - 1);
       }
     }
     this.gap_s = 0;
     this.newest_us = t_us;
+    this.newest_frame = frame;
     const slot = this.next % this.capacity;
     this.next++;
     this.oldest = Math.max(this.oldest, this.next - this.capacity);
     this.t_s[slot] = t_s;
-    this.frame[slot] = frame;
     this.lost[slot] = lost;
     this.valid[slot] = this.saturated[slot] = this.doubtful[slot] = 0;
     for (const { column } of this.fields) {

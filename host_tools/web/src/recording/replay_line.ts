@@ -103,9 +103,6 @@ function problemOf(reader: Reader, packets: number): string {
 /** A page that was asleep goes on where it was. */
 const STEP_MOST_ms = 250;
 const TICK_ms = 10;
-const ENDED = 'the replay has ended';
-/** For each pad; onEnd reports once what is wrong with the file. */
-const ENDED_EARLY = 'the replay has ended before the end of the file';
 
 class ReplayLine implements Line {
   private receive: ((bytes: Uint8Array, at_ms: number) => void) | null = null;
@@ -264,9 +261,7 @@ export class Replay {
 
   private end(problem: string): void {
     this.stopped = true;
-    for (const line of this.lines) {
-      line?.end(problem ? ENDED_EARLY : ENDED);
-    }
+    this.lines.forEach((line) => line?.end(`the replay has ended${problem ? ' before the end of the file' : ''}`));
     this.onEnd(problem);
   }
 }

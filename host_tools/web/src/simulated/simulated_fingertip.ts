@@ -1,11 +1,7 @@
 /**
  * A fingertip without hardware: the firmware's own code on simulated sensors under simulated
  * rubber, in a worker, in real time. Simulated figures, all of them.
- *
- * The pad: 12 mm of silicone without ends (host_tools/simulation/twin), 30 by 50 mm around 3 x 5 sensors, x across, y along, origin
- * in the middle. host_tools/web/wasm/world.hpp explains what happens to it.
- * Places beyond the pad and values beyond their ranges are no error: nothing is touched there, and what is too
- * much counts as the most.
+ * host_tools/web/wasm/world.hpp explains the pad and what happens to it.
  */
 import type { Line } from '../line/line';
 import { NO_TRUTH, type Hand } from '../view/shown';

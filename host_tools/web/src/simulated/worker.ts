@@ -1,4 +1,5 @@
 /** Runs a simulated fingertip beside the page. */
+import { fetched } from '../../wasm/module.mjs';
 import { RealTime } from '../../wasm/real_time.mjs';
 import type { ShownTruth } from '../view/shown';
 
@@ -23,14 +24,6 @@ let fingertip: Promise<RealTime> | null = null;
 
 function post(message: FromWorker, transfer: Transferable[] = []): void {
   postMessage(message, { transfer });
-}
-
-async function fetched(url: string): Promise<ArrayBuffer> {
-  const response = await fetch(url);
-  if (!response.ok) {
-    throw new Error(`${url}: ${response.status}`);
-  }
-  return response.arrayBuffer();
 }
 
 async function start({ wasm, objects, options }: ToWorker & { kind: 'open' }): Promise<RealTime> {

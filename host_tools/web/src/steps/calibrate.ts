@@ -2,6 +2,8 @@
  * Calibrate: the tool's sessions, judgement and sentences (host_tools/tool/calibration), for the sensors'
  * gains from placements of one weight, and for the scale of the tangential force from pulls.
  */
+import { load as loadJudges } from '../../wasm/judges.mjs';
+import { fetched } from '../../wasm/module.mjs';
 import { frameOf } from '../core';
 import { Capability, PacketType, Stored } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
@@ -11,7 +13,6 @@ import { fixed } from '../view/numbers';
 import type { Hand } from '../view/shown';
 import { MAIN, element, paragraph } from '../view/elements';
 import { Dialog, field, form } from './dialog';
-import { loadJudges } from './judges';
 
 type Judges = Awaited<ReturnType<typeof loadJudges>>;
 type GainSession = ReturnType<Judges['gains']>;
@@ -124,7 +125,7 @@ export function calibrate(fingertip: Fingertip): void {
   const begin = (work: (judges: Judges, info: Uint8Array, force_N: number | null) => Promise<void>) => async () => {
     const force_N = forceOf(weight.value);
     await checkSensors(fingertip);
-    const [judges, info] = [await loadJudges(), await fingertip.askInfo()];
+    const [judges, info] = [await loadJudges(fetched('wasm/judges.wasm')), await fingertip.askInfo()];
     if (!dialog.is_closed) {
       await work(judges, frameOf(info), force_N);
     }

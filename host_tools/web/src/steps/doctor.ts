@@ -1,4 +1,6 @@
 /** Doctor: the tool's own checks and sentences (host_tools/tool/doctor), over ten seconds at rest. */
+import { load as loadJudges } from '../../wasm/judges.mjs';
+import { fetched } from '../../wasm/module.mjs';
 import { countsSince, frameOf } from '../core';
 import { PacketType } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
@@ -6,7 +8,6 @@ import { PATIENCE, pause } from '../model/patience';
 import { MAIN, element } from '../view/elements';
 import { PAGE_VERSION } from './app';
 import { Dialog } from './dialog';
-import { loadJudges } from './judges';
 
 const SECONDS = 10;
 const VERDICTS = { ok: 'fine', warn: 'look', bad: 'wrong' };
@@ -37,7 +38,7 @@ export function examine(fingertip: Fingertip): void {
 }
 
 async function findingsOf(fingertip: Fingertip, dialog: Dialog, bar: HTMLProgressElement) {
-  const judges = await loadJudges();
+  const judges = await loadJudges(fetched('wasm/judges.wasm'));
   const tool_version = PAGE_VERSION.split('.').map(Number);
   const examination = judges.examination({ port: fingertip.line.label, tool_version });
   let measuring = false;

@@ -57,28 +57,17 @@ export function fingertipControls(app: App, fingertip: Fingertip): HTMLElement {
   speed.addEventListener('change', () => app.changeReplay(app.replays.get(fingertip), { speed: Number(speed.value) }));
   const leave_button = button('Disconnect', () => void app.disconnect(fingertip));
 
-  const controls = element(
-    'div',
-    { class: 'controls', role: 'group' },
-    tare_button,
-    set_button,
-    calibrate_button,
-    record_button,
-    stop_button,
-    pause_button,
-    speed,
-    skip_button,
-    doctor_button,
-    flash_button,
-    leave_button,
-  );
+  const working = [tare_button, set_button, calibrate_button, doctor_button];
+  const playing = [pause_button, speed, skip_button];
+  const controls = element('div', { class: 'controls', role: 'group' }, ...working, record_button, stop_button, ...playing);
+  controls.append(flash_button, leave_button);
   const show = (): void => {
     const { info, state, is_replay, found } = fingertip;
     const live = (state === 'live' || state === 'silent') && !is_replay && info !== null;
     const recording = app.recorders.has(fingertip);
     const replay = app.replays.get(fingertip);
     controls.setAttribute('aria-label', `Fingertip ${fingertip.name}`);
-    for (const button of [tare_button, set_button, calibrate_button, doctor_button]) {
+    for (const button of working) {
       button.disabled = !live || (found !== null && button !== doctor_button);
       button.hidden = is_replay;
     }
@@ -88,7 +77,7 @@ export function fingertipControls(app: App, fingertip: Fingertip): HTMLElement {
     stop_button.hidden = !recording;
     flash_button.disabled = found !== null;
     flash_button.hidden = is_replay || app.portOf(fingertip) === null;
-    for (const control of [pause_button, speed, skip_button]) {
+    for (const control of playing) {
       control.hidden = !replay;
       control.disabled = state === 'closed';
     }

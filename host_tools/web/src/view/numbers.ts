@@ -9,7 +9,6 @@ interface Number_ {
   readonly title: string;
   readonly unit: string;
   readonly valid: number;
-  /** Whether warnings make it doubtful. */
   readonly value: (contact: ShownContact) => string;
   readonly sd?: (contact: ShownContact) => string;
   /** The true value of a simulated fingertip. */

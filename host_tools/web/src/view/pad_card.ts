@@ -28,7 +28,9 @@ export class PadCard {
   private readonly empty = element('p', { class: 'empty' }, 'No answer yet.');
 
   constructor(
-    private readonly shown: Shown,
+    readonly shown: Shown,
+    /** What can be done with it. */
+    readonly doings: HTMLElement,
     select: () => void,
   ) {
     const dot = element('span', { class: 'dot', 'aria-hidden': 'true' });

@@ -4,7 +4,6 @@
 export type Colour = readonly [number, number, number];
 
 export interface Palette {
-  readonly dark: boolean;
   /** The value of a name in tokens.css, without its dashes in front. */
   css(name: string): string;
   of(name: string): Colour;
@@ -30,12 +29,7 @@ export function paletteOf(declared: (name: string) => string, dark: boolean): Pa
     return (dark ? both[2] : both[1]) ?? '';
   };
   const of = (name: string) => parsed(css(name));
-  return {
-    dark,
-    css,
-    of,
-    heat: Array.from({ length: HEAT_STOPS }, (_, i) => of(`heat-${i}`)),
-  };
+  return { css, of, heat: Array.from({ length: HEAT_STOPS }, (_, i) => of(`heat-${i}`)) };
 }
 
 /** part: of heatPart. */

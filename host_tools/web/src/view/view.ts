@@ -42,9 +42,7 @@ const NOTICE_ms = 20000;
 export class View {
   /** Pictures drawn so far. */
   pictures = 0;
-  private readonly shown = new Map<Fingertip, Shown>();
   private readonly cards = new Map<Fingertip, PadCard>();
-  private readonly doings = new Map<Fingertip, HTMLElement>();
   private selected: Fingertip | null = null;
   private made = 0;
   private readonly numbers = new Numbers();
@@ -52,14 +50,8 @@ export class View {
   private readonly health = new HealthPanel();
   private readonly timeline = new Timeline();
   private readonly speech = new Speech();
-  private readonly pads = element('div', { class: 'pads' });
-  private readonly handPlace = element('div', { class: 'hand-place' });
-  private readonly heading = element('h2');
-  private readonly doingsPlace = element('div', { class: 'doings', role: 'group' });
-  private readonly live = element('p', { class: 'spoken', role: 'status', 'aria-live': 'polite' });
-  private readonly notices = element('div', { class: 'notices', role: 'alert' });
-  private readonly welcome: HTMLElement;
-  private readonly work: HTMLElement;
+  /** Of index.html, by its class. */
+  private readonly part = (name: string): HTMLElement => this.root.querySelector(`.${name}`)!;
   private tracesAt_ms = 0;
   private textAt_ms = 0;
   private healthAt_ms = 0;
@@ -74,28 +66,16 @@ export class View {
     private readonly controls: Controls,
   ) {
     restoreTheme();
-    this.welcome = this.welcomeOf();
-    this.work = element(
-      'div',
-      { class: 'work', hidden: true },
-      element('section', { class: 'pads-place', 'aria-label': 'Pads' }, this.pads),
-      element(
-        'section',
-        { class: 'side', 'aria-label': 'Numbers' },
-        element('div', { class: 'who' }, this.heading, this.doingsPlace),
-        this.numbers.element,
-        this.handPlace,
-      ),
-      element('section', { class: 'over-time', 'aria-label': 'Over time' }, this.traces.element, this.timeline.element),
-      element('section', { class: 'behind', 'aria-label': 'Health' }, this.health.element),
-    );
-    this.root.append(
-      element('a', { class: 'skip', href: '#main' }, 'To the fingertip'),
-      this.header(),
-      this.notices,
-      element('main', { id: 'main', tabindex: -1 }, this.welcome, this.work),
-      this.live,
-    );
+    this.root.append(this.root.querySelector('template')!.content);
+    this.part('top-actions').prepend(this.controls.page);
+    const themes = this.root.querySelector<HTMLSelectElement>('.themes')!;
+    themes.value = theme();
+    themes.addEventListener('change', () => setTheme(themes.value as Theme));
+    const words = ['Connect a fingertip', 'Try the simulated one'] as const;
+    this.part('begin').append(...beginning(words, this.controls.connect, this.controls.simulate));
+    this.part('hand-place').before(this.numbers.element);
+    this.part('over-time').append(this.traces.element, this.timeline.element);
+    this.part('behind').append(this.health.element);
     this.traces.setPalette(palette());
     onPalette((changed) => {
       this.traces.setPalette(changed);
@@ -123,9 +103,9 @@ export class View {
     for (const [of, card] of this.cards) {
       card.selected = of === fingertip;
     }
-    const doings = fingertip && this.doings.get(fingertip);
-    this.doingsPlace.replaceChildren(...(doings ? [doings] : []));
-    this.handPlace.replaceChildren();
+    const card = fingertip && this.cards.get(fingertip);
+    this.part('doings').replaceChildren(...(card ? [card.doings] : []));
+    this.part('hand-place').replaceChildren();
     this.tracesDue = true;
     this.textAt_ms = this.healthAt_ms = -Infinity;
   }
@@ -134,8 +114,8 @@ export class View {
   notice(text: string, level: 'plain' | 'bad' = 'plain'): void {
     const notice = element('div', { class: `notice ${level}` }, element('p', {}, text));
     notice.append(button('Close', () => notice.remove(), { class: 'small' }));
-    this.notices.append(notice);
-    const all = [...this.notices.children];
+    this.part('notices').append(notice);
+    const all = [...this.part('notices').children];
     leaving(all.map((each) => ({ text: each.textContent, is_plain: each.matches('.plain') }))).forEach((i) => all[i].remove());
     setTimeout(() => level === 'plain' && notice.remove(), NOTICE_ms);
   }
@@ -145,64 +125,26 @@ export class View {
     for (const [fingertip, card] of this.cards) {
       if (!fingertips.includes(fingertip)) {
         card.element.remove();
-        for (const map of [this.cards, this.shown, this.doings, this.ends]) {
-          map.delete(fingertip);
-        }
+        this.cards.delete(fingertip);
+        this.ends.delete(fingertip);
       }
     }
     let came: Fingertip | null = null;
     for (const fingertip of fingertips) {
       if (!this.cards.has(fingertip)) {
         const shown = new Shown(fingertip, this.made++);
-        const card = new PadCard(shown, () => this.choose(fingertip));
-        this.shown.set(fingertip, shown);
+        const card = new PadCard(shown, this.controls.of(fingertip), () => this.choose(fingertip));
         this.cards.set(fingertip, card);
-        this.doings.set(fingertip, this.controls.of(fingertip));
-        this.pads.append(card.element);
+        this.part('pads').append(card.element);
         came = fingertip;
       }
     }
-    this.pads.dataset['count'] = String(fingertips.length);
-    this.welcome.hidden = fingertips.length > 0;
-    this.work.hidden = fingertips.length === 0;
+    this.part('welcome').hidden = fingertips.length > 0;
+    this.part('work').hidden = fingertips.length === 0;
     const gone = this.selected === null || !fingertips.includes(this.selected);
     if (came || gone) {
       this.choose(came ?? fingertips[0] ?? null);
     }
-  }
-
-  private header(): HTMLElement {
-    const themes = element(
-      'select',
-      { 'aria-label': 'Colours' },
-      ...(['system', 'light', 'dark'] as const).map((name) =>
-        element('option', { value: name, selected: name === theme() }, { system: 'Auto', light: 'Light', dark: 'Dark' }[name]),
-      ),
-    );
-    themes.addEventListener('change', () => setTheme(themes.value as Theme));
-    return element(
-      'header',
-      { class: 'top' },
-      element('h1', {}, 'Fingertip'),
-      element('div', { class: 'top-actions' }, this.controls.page, themes),
-    );
-  }
-
-  private welcomeOf(): HTMLElement {
-    const words = ['Connect a fingertip', 'Try the simulated one'] as const;
-    return element(
-      'section',
-      { class: 'welcome', 'aria-label': 'Begin' },
-      element('h2', {}, 'Touch, in numbers'),
-      element(
-        'p',
-        {},
-        'This page shows where a soft fingertip with fifteen pressure sensors is touched, how hard, and whether ' +
-          'the thing slips. Plug one in, or try it without: a simulated one runs the same firmware in this page.',
-      ),
-      element('div', { class: 'begin' }, ...beginning(words, this.controls.connect, this.controls.simulate)),
-      element('p', { class: 'hint' }, 'Or drop a recording here. Nothing leaves this computer.'),
-    );
   }
 
   private timeChanged(): void {
@@ -211,7 +153,7 @@ export class View {
       this.ends.clear();
       return;
     }
-    for (const fingertip of this.shown.keys()) {
+    for (const fingertip of this.cards.keys()) {
       if (!this.ends.has(fingertip)) {
         this.ends.set(fingertip, newest_s(fingertip.history));
       }
@@ -222,7 +164,7 @@ export class View {
     const target = event.target as HTMLElement;
     const busy =
       target.closest('input, select, textarea, button, summary, dialog, a') !== null || event.ctrlKey || event.metaKey || event.altKey;
-    if (busy || this.shown.size === 0) {
+    if (busy || this.cards.size === 0) {
       return;
     }
     if (event.key === ' ') {
@@ -248,18 +190,17 @@ export class View {
       const end_s = this.ends.get(fingertip) ?? newest_s(fingertip.history);
       drawn = card.draw(end_s, behind_s, now_ms, colours) || drawn;
     }
-    const chosen = this.selected;
-    const shown = chosen && this.shown.get(chosen);
-    const card = chosen && this.cards.get(chosen);
-    if (shown && card) {
-      drawn = this.drawChosen(shown, card, behind_s, now_ms) || drawn;
+    const card = this.selected && this.cards.get(this.selected);
+    if (card) {
+      drawn = this.drawChosen(card, behind_s, now_ms) || drawn;
     }
     if (drawn) {
       this.pictures++;
     }
   }
 
-  private drawChosen(shown: Shown, card: PadCard, behind_s: number | null, now_ms: number): boolean {
+  private drawChosen(card: PadCard, behind_s: number | null, now_ms: number): boolean {
+    const { shown } = card;
     const { fingertip } = shown;
     const { history } = fingertip;
     const end_s = this.ends.get(fingertip) ?? newest_s(history);
@@ -275,7 +216,7 @@ export class View {
     }
     if (now_ms - this.textAt_ms >= TEXT_INTERVAL_ms) {
       this.textAt_ms = now_ms;
-      this.writeTexts(shown, card, now_ms);
+      this.writeTexts(card, now_ms);
     }
     if (now_ms - this.healthAt_ms >= HEALTH_INTERVAL_ms) {
       this.healthAt_ms = now_ms;
@@ -287,25 +228,25 @@ export class View {
     return drawn;
   }
 
-  private writeTexts(shown: Shown, card: PadCard, now_ms: number): void {
+  private writeTexts({ shown, contact, hand }: PadCard, now_ms: number): void {
     for (const each of this.cards.values()) {
       each.writeTexts();
     }
-    const { contact, hand } = card;
-    write(this.heading, shown.name);
+    write(this.root.querySelector('.who h2')!, shown.name);
     this.timeline.isReplay = shown.fingertip.is_replay;
-    this.doingsPlace.setAttribute('aria-label', `What to do with ${shown.name}`);
+    this.part('doings').setAttribute('aria-label', `What to do with ${shown.name}`);
     const truth = this.timeline.behind_s === null ? shown.truth : null;
     this.numbers.show(contact, shown.tangential, shown.fingertip.info?.location_limit_mm ?? 0, truth);
-    if ((hand?.element ?? null) !== this.handPlace.firstElementChild) {
-      this.handPlace.replaceChildren(...(hand ? [hand.element] : []));
+    const place = this.part('hand-place');
+    if ((hand?.element ?? null) !== place.firstElementChild) {
+      place.replaceChildren(...(hand ? [hand.element] : []));
     }
     if (this.timeline.behind_s === null) {
-      const several = this.shown.size > 1 ? `${shown.name}: ` : '';
+      const several = this.cards.size > 1 ? `${shown.name}: ` : '';
       const state = shown.state(performance.now()).words.replace(/ for \d+ s$/, '');
       const sentence = this.speech.sentence(contact, state, now_ms);
       if (sentence) {
-        write(this.live, several + sentence);
+        write(this.part('spoken'), several + sentence);
       }
     }
   }
