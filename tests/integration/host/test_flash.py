@@ -83,6 +83,7 @@ class Flash(CliTest):
     def test_another_board_is_refused_before_anything_happens(self):
         err = self.flash("board=pico_parallel", status=1)[1]
         self.assertIn("for board pico_mux, but fingertip E660583883265A2C is a pico_parallel; give fingertip-pico_parallel.uf2", err)
+        self.assertIn("is simulated, and takes no firmware", self.flash("board=native", status=1)[1])
         self.assertFalse(os.path.exists(self.volume))
 
     def test_nothing_there_says_what_to_press(self):

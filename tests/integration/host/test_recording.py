@@ -186,15 +186,18 @@ class LiveData(CliTest):
         """From the beginning or later: what was written stays readable."""
         for command, full in (
             ("record /dev/full", "/dev/full"),
-            (f"record {self.csv} --raw-bytes /dev/full", "/dev/full"),
+            (f"record {self.csv} --raw-bytes /dev/full --seconds 1", "/dev/full"),
             ("monitor --record /dev/full", "/dev/full"),
             (f"record {self.csv}", self.csv),
-            (f"record - --raw-bytes {self.ftr}", self.ftr),
+            (f"record - --raw-bytes {self.ftr} --seconds 2", self.ftr),
         ):
             with self.device():
-                _, err = self.run_cli(*command.split(), "--overwrite", "--port", self.port, status=1, preexec_fn=disk_of(20000))
+                most_bytes = 10**9 if full == "/dev/full" else 20000
+                _, err = self.run_cli(*command.split(), "--overwrite", "--port", self.port, status=1, preexec_fn=disk_of(most_bytes))
             why = "No space left on device" if full == "/dev/full" else "File too large"
             self.assertRegex(err.splitlines()[-1], rf"^fingertip: {full}: {why}; .*(make room and start a new file|--salvage)$")
+            if "/dev/full --sec" in command:  # the recording is whole, on another disk
+                self.assertIn("\n# end: reason=seconds ", pathlib.Path(self.csv).read_text(encoding="utf-8"))
         for path in (self.csv, self.ftr):
             self.assertRegex(self.run_cli("replay", path, "--speed", "max", "--salvage")[0], r" [1-9]\d+ frames in")
 

@@ -177,6 +177,9 @@ std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &im
   std::string serial = way.serial;
   try {
     wire_info info = session.info(QUICK).body.info;
+    if (text_field(info.board) == "native") {
+      throw Error("fingertip " + text_field(info.serial) + " is simulated, and takes no firmware; name another with --device");
+    }
     if (text_field(info.board) != image.board) {
       throw Error(options.file + ": for board " + image.board + ", but fingertip " + text_field(info.serial) + " is a " +
                   text_field(info.board) + "; give fingertip-" + text_field(info.board) + ".uf2");

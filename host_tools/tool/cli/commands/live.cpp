@@ -86,6 +86,9 @@ public:
       throw Interrupted();
     }
     finish();
+    if (raw_failure_) {
+      throw *raw_failure_;
+    }
     if (!several() && models_[0].frames() == 0 && reason_ == "gone") {
       throw Gone(loops_[0]->name() + ": vanished before the first frame");
     }
@@ -145,10 +148,12 @@ private:
       break;
     case Kind::mute: event(news.device, "no answer to the end of the streams"); break;
     case Kind::bytes:
-      if (!raw_bytes_) {
-        raw_bytes_ = std::make_unique<QueuedSink>(options_.raw_bytes, options_.overwrite);
-      }
-      raw_bytes_->append(news.bytes.data(), news.bytes.size());
+      keep([&] {
+        if (!raw_bytes_) {
+          raw_bytes_ = std::make_unique<QueuedSink>(options_.raw_bytes, options_.overwrite);
+        }
+        raw_bytes_->append(news.bytes.data(), news.bytes.size());
+      });
       break;
     case Kind::clock:
       if (RecordingWriter *recording = joint_recording()) {
@@ -159,6 +164,18 @@ private:
       running_--;
       stop(); /* the others end too; what was written stays */
       break;
+    }
+  }
+
+  /* Bytes of the line, until they cannot be written: the recording goes on, and run ends with that error. */
+  template <typename Action> void keep(const Action &action) {
+    try {
+      if (!raw_failure_) {
+        action();
+      }
+    } catch (const Error &error) {
+      raw_failure_ = error;
+      note_ += "  no bytes in " + printable(options_.raw_bytes) + " from now on";
     }
   }
 
@@ -326,7 +343,7 @@ private:
       recording_->finish(statistics, reason_);
     }
     if (raw_bytes_) {
-      raw_bytes_->finish();
+      keep([&] { raw_bytes_->finish(); });
     }
     std::string name = recording_ && !to_standard_output_ ? printable(options_.recording) + ": " : "";
     if (!several()) {
@@ -360,6 +377,7 @@ private:
   std::vector<Model> models_;
   std::vector<std::optional<DeviceNews>> ready_;
   std::unique_ptr<ByteSink> raw_bytes_;
+  std::optional<Error> raw_failure_;
   std::optional<LiveRecording> recording_;
   std::unique_ptr<View> view_;
   std::string note_;
