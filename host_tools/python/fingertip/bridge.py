@@ -10,6 +10,7 @@ import argparse
 import collections
 import concurrent.futures
 import contextlib
+import functools
 import json
 import os
 import pathlib
@@ -292,6 +293,4 @@ def main(argv):
     return 0
 
 
-def command():
-    """The console command fingertip-bridge."""
-    return run_tool("fingertip-bridge", main)
+command = functools.partial(run_tool, "fingertip-bridge", main)

@@ -190,4 +190,3 @@ def main(argv):
 
 
 command = functools.partial(run_tool, "fingertip-evaluate", main)
-"""The console command."""

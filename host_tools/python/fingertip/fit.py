@@ -520,5 +520,4 @@ def _texts(values: npt.NDArray[Any], name: str) -> list[str]:
     return ["" if text == "nan" else text for text in texts]
 
 
-def command() -> int:
-    return run_tool("fingertip fit", main)
+command = functools.partial(run_tool, "fingertip fit", main)

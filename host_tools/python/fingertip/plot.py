@@ -6,6 +6,7 @@ With --beside it draws what another fingertip of the recording measured of the s
 """
 
 import argparse
+import functools
 import io
 import sys
 
@@ -410,6 +411,4 @@ def main(argv):
     return 0
 
 
-def command():
-    """The console command fingertip-plot."""
-    return run_tool("fingertip-plot", main)
+command = functools.partial(run_tool, "fingertip-plot", main)

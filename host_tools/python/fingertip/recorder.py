@@ -6,6 +6,7 @@ Exit status: 0 nothing was lost, 3 something was, and is counted, 1 an error.
 """
 
 import argparse
+import functools
 import itertools
 import json
 import math
@@ -525,6 +526,4 @@ def main(argv):
     return 3 if any(each["lost"] or each["restarts"] or each["unread_frames"] or each["unheard"] for each in figures.values()) else 0
 
 
-def command():
-    """The console command fingertip-recorder."""
-    return run_tool("fingertip-recorder", main)
+command = functools.partial(run_tool, "fingertip-recorder", main)

@@ -220,4 +220,3 @@ def main(argv: list[str]) -> int:
 
 
 command = functools.partial(run_tool, "fingertip-ros2", main)
-"""The console command."""

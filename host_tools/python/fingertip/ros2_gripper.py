@@ -192,4 +192,3 @@ def main(argv: list[str]) -> int:
 
 
 command = functools.partial(run_tool, "fingertip-ros2-gripper", main)
-"""The console command."""

@@ -164,4 +164,3 @@ def main(argv):
 
 
 command = functools.partial(run_tool, "fingertip-scenario", main)
-"""The console command."""

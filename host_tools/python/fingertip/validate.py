@@ -166,4 +166,3 @@ def run(argv):
 
 
 command = functools.partial(run_tool, "fingertip", run)
-"""The console command fingertip-validate."""
