@@ -77,9 +77,10 @@ def info_metadata(info: Info) -> dict[str, str]:
 
 def _open_lines(path: "str | os.PathLike[str]", replace: bool) -> LineFile | McapLines:
     """The file that the lines of a recording go to, by its name. Raises InputError."""
-    if os.fspath(path).lower().endswith(".mcap"):
-        return McapLines(path, replace)
-    return LineFile(path, replace)
+    end = os.path.splitext(os.fspath(path))[1].lower()
+    if end not in ("", ".csv", ".mcap"):
+        raise InputError(f"{os.fspath(path)}: must end with .csv or .mcap, which selects the format")
+    return McapLines(path, replace) if end == ".mcap" else LineFile(path, replace)
 
 
 def _own_keys(extra: Mapping[str, str | None] | None) -> dict[str, str]:

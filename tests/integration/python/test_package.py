@@ -219,6 +219,7 @@ class Streaming(DeviceTest):
     def test_a_full_disk_ends_the_recording_alone(self):
         with self.device(), Fingertip(self.port, timeout_s=PATIENCE_s) as tip:
             self.assertRaisesRegex(fingertip.InputError, "No space left on device", tip.record, "/dev/full", replace=True)
+            self.assertRaisesRegex(fingertip.InputError, "must end with .csv or .mcap", tip.record, self.path("r.bag"))
             most_bytes = resource.getrlimit(resource.RLIMIT_FSIZE)
             resource.setrlimit(resource.RLIMIT_FSIZE, (0, most_bytes[1]))
             self.assertRaisesRegex(fingertip.InputError, "File too large", tip.record, self.path("r.csv"))
