@@ -139,6 +139,10 @@ std::string problem_of(const CLI::App *failed, const CLI::Error &error) {
   if (kind == "ArgumentMismatch" && text.find(" required ") != std::string::npos) {
     return text.substr(0, text.find(':')) + " lacks its value";
   }
+  if (const std::size_t equals = text.find(" = "); kind == "ConversionError" && equals != std::string::npos) {
+    const std::size_t name = text.find(": ") + 2;
+    return text.substr(name, equals - name) + " takes a number, not \"" + text.substr(equals + 3) + "\"";
+  }
   if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError)) {
     /* Its name is the command's. It lists the words from the last to the first. */
     const std::string first = text.substr(text.rfind(' ') + 1);

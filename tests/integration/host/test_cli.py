@@ -53,6 +53,7 @@ class Usage(CliTest):
             *((f"replay x.csv --speed {value}", ".*; give 0.01 to 1000, or max;.*") for value in ("abc", "0", "nan", "-1", "1001")),
             ("set --keep --forget", ".*excludes.*"),
             ("set", "nothing to set; give .*"),
+            ("gripper move x --model 2f85", 'WIDTH takes a number, not "x"; see fingertip gripper --help'),
             ("info --port", "--port lacks its value; see fingertip info --help"),
             ("set rate=5 osr=256 rate=6", "rate=6: is set twice; set it once"),
             (f"set --port {self.port} rate=0", ".*0.1 to 2000 Hz, or max.*"),  # found before a port is opened
