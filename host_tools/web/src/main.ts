@@ -11,7 +11,7 @@ import { fetched } from '../wasm/module.mjs';
 import { loadCore } from './core';
 import type { Fingertip } from './model/fingertip';
 import { App } from './steps/app';
-import { fingertipControls, pageControls } from './steps/toolbar';
+import { begin, fingertipControls, pageControls } from './steps/toolbar';
 import { element, wordsOf } from './view/elements';
 import { keepFocus } from './view/focus';
 import { View } from './view/view';
@@ -25,8 +25,7 @@ function start(): void {
   const view = new View(document.body, app, {
     page: pageControls(app),
     of: (fingertip) => fingertipControls(app, fingertip),
-    connect: () => void app.connect(),
-    simulate: () => app.simulate(),
+    begin: begin(app, 'Connect a fingertip', 'Try the simulated one'),
   });
   app.notice = (text, kind) => view.notice(text, kind);
   keepFocus();

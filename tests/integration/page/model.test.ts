@@ -10,7 +10,7 @@ import { PATIENCE } from '../../../host_tools/web/src/model/patience';
 import { History } from '../../../host_tools/web/src/model/history';
 import { Recorder } from '../../../host_tools/web/src/recording/recorder';
 import { App } from '../../../host_tools/web/src/steps/app';
-import { commandsFor } from '../../../host_tools/web/src/steps/settings';
+import { commandsFor, set } from '../../../host_tools/web/src/steps/settings';
 import { tare } from '../../../host_tools/web/src/steps/tare';
 import { factsOf } from '../../../host_tools/web/src/view/health_facts';
 import { Shown } from '../../../host_tools/web/src/view/shown';
@@ -235,15 +235,14 @@ test('the cable is pulled amid a command: it fails at once, with words; another 
 
 test('closed amid a step of its opening: it stays closed, its line too', async () => {
   let opened = (): void => undefined;
-  let closes = 0;
-  const close = async (): Promise<void> => void closes++;
+  const close = test.mock.fn(async () => {});
   const late = Object.assign(new SpokenLine(), { close, open: () => new Promise<void>((done) => (opened = done)) });
   const fingertip = new Fingertip(late);
   const refused = assert.rejects(fingertip.open(), /disconnected by you/);
   await fingertip.close();
   opened();
   await refused;
-  assert.deepEqual([closes, late.commands], [2, []]);
+  assert.deepEqual([close.mock.callCount(), late.commands], [2, []]);
   const brief = Object.assign(new SpokenLine(), { ends_after: PacketType.CMD_STREAM });
   await assert.rejects(new Fingertip(brief).open(), /unplugged/);
 });
@@ -314,8 +313,7 @@ test('what is shown as present is of a frame that has just come, by the rate tha
     line.receive(core.encode({ sequence: line.sequence++, t_us: 1000 * ms, ...packet }), ms);
   at(1e6, contactOf(1, 1e9, { flags: Flag.TARED, total_us: 1500 }));
   at(1e6, rawOf(1, 1e9, [0]));
-  assert.equal(facts(1e6 + 600)['latency'], '1.50 ms');
-  assert.equal(facts(1e6 + 600)['answer'], undefined, 'no health packet has come');
+  assert.deepEqual([facts(1e6 + 600)['latency'], facts(1e6 + 600)['answer']], ['1.50 ms', undefined]); // no health packet has come
   at(1e6 + 900, vector('health'));
   const { frames, latency, temperature, answer } = facts(1e6 + 1000);
   assert.deepEqual([shown.isCurrent(1e6 + 1000), shown.state(1e6 + 1000).words], [false, 'stalled for 1 s']);
@@ -360,8 +358,10 @@ test('history: a ring with absolute numbers, times that never fall, frames that 
   assert.ok(Math.abs(history.t_s[20 % 8]! - 2.022) < 1e-9);
   assert.ok(Math.abs(history.t_s[21 % 8]! - 2.023) < 1e-9);
   history.addRaw(rawOf(5, 5010, [3, 3], { flags: Flag.TARED | Flag.FIT_VALID })); // without its contact packet: a row of its own
-  assert.equal(history.end, 23);
-  assert.equal(history.flags[22 % 8], Flag.TARED);
+  assert.deepEqual([history.end, history.flags[22 % 8]], [23, Flag.TARED]);
+  history.addContact(contactOf(6, 6010)); // without its raw packet
+  history.addRaw(rawOf(7, 7010, [3, 3], { flags: Flag.HELD, valid: 0 }));
+  assert.equal(history.readingsAt(24)?.valid, 3);
   assert.ok(Number.isNaN(history.columns.force_N[22 % 8]));
 });
 
@@ -373,7 +373,7 @@ test('values that no packet may hold are refused', () => {
   assert.throws(() => core.encode({ ...core.blank(PacketType.INFO), sensor_count: 1, board: 'longer than sixteen' } as Info), /board/);
 });
 
-test('settings: commands for what differs', () => {
+test('settings: commands for what differs; what it has is asked for after a refusal too', async () => {
   const info = vector('info_grasp') as Info;
   const now = { rate: '20', osr: '1024', slip_threshold: '0.75', slip_window: '100', prior: '3.125:0.5', limit: '0.625' };
   assert.deepEqual(commandsFor(info, now), []);
@@ -385,4 +385,8 @@ test('settings: commands for what differs', () => {
     { type: PacketType.CMD_LOCATION_LIMIT, limit_mm: 0.5 },
   ]);
   assert.throws(() => commandsFor(info, { rate: '20:30' }), /too much/);
+  const [fingertip, line] = await opened();
+  line.result = Result.OUT_OF_RANGE;
+  await assert.rejects(set(fingertip, commandsFor(info, { osr: '256' })), /range/);
+  assert.equal(line.commands.at(-1), PacketType.CMD_INFO);
 });

@@ -43,14 +43,16 @@ export class History {
   readonly pressure_Pa: Float32Array;
   /** [sensor], of the calibration in use; empty: none. */
   gain: ArrayLike<number> = [];
+  /** The oldest row that is kept, and one after the newest. */
+  begin = 0;
+  end = 0;
   /** How long nothing was heard before what comes next; counts where its clock restarts. */
   gap_s = 0;
 
-  private oldest = 0;
-  private next = 0;
   private offset_s = 0;
   private newest_us = 0;
   private newest_frame = 0;
+  private measured = { valid: 0, saturated: 0, doubtful: 0 };
   private readonly fields: { field: ContactField; flag: number; column: Float32Array }[];
 
   constructor(sensor_count: number, capacity = HISTORY_ROWS) {
@@ -71,24 +73,14 @@ export class History {
     this.columns = Object.fromEntries(this.fields.map(({ field, column }) => [field, column])) as Record<ContactField, Float32Array>;
   }
 
-  /** The oldest row that is kept. */
-  get begin(): number {
-    return this.oldest;
-  }
-
-  /** One after the newest row. */
-  get end(): number {
-    return this.next;
-  }
-
   slot(row: number): number {
     return row % this.capacity;
   }
 
   /** The first kept row not before this time; end if there is none. */
   rowAt(t_s: number): number {
-    let low = this.oldest;
-    let high = this.next;
+    let low = this.begin;
+    let high = this.end;
     while (low < high) {
       const middle = Math.floor((low + high) / 2);
       if (this.t_s[middle % this.capacity] < t_s) {
@@ -102,7 +94,7 @@ export class History {
 
   /** A view of a row's readings, overwritten with it; null where no raw packet came. */
   readingsAt(row: number): Readings | null {
-    if (row < this.oldest || row >= this.next) {
+    if (row < this.begin || row >= this.end) {
       return null;
     }
     const slot = row % this.capacity;
@@ -120,16 +112,16 @@ export class History {
   }
 
   addRaw(raw: Raw): void {
-    const known = this.next;
+    const known = this.end;
     const slot = this.slotOf(raw.frame, raw.t_us);
-    if (this.next !== known) {
+    if (this.end !== known) {
       this.flags[slot] = raw.flags & ~QUANTITIES;
     }
     const held = (raw.flags & Flag.HELD) !== 0; // its readings are those of the frame before
-    const before = (slot + this.capacity - 1) % this.capacity;
-    this.valid[slot] = held ? this.valid[before] : raw.valid;
-    this.saturated[slot] = held ? this.saturated[before] : raw.saturated;
-    this.doubtful[slot] = held ? this.doubtful[before] : raw.doubtful;
+    if (!held) {
+      this.measured = { valid: raw.valid, saturated: raw.saturated, doubtful: raw.doubtful };
+    }
+    ({ valid: this.valid[slot], saturated: this.saturated[slot], doubtful: this.doubtful[slot] } = this.measured);
     const count = Math.min(this.sensor_count, raw.sensor_count);
     const at = slot * this.sensor_count;
     const measured = held ? 2 ** count - 1 : raw.valid;
@@ -143,8 +135,8 @@ export class History {
   private slotOf(frame: number, t_us: number): number {
     let t_s = t_us / 1e6 + this.offset_s;
     let lost = 0;
-    if (this.next > this.oldest) {
-      const newest = (this.next - 1) % this.capacity;
+    if (this.end > this.begin) {
+      const newest = (this.end - 1) % this.capacity;
       const newest_s = this.t_s[newest];
       if (this.newest_frame === frame && this.newest_us === t_us) {
         return newest;
@@ -159,9 +151,9 @@ export class History {
     this.gap_s = 0;
     this.newest_us = t_us;
     this.newest_frame = frame;
-    const slot = this.next % this.capacity;
-    this.next++;
-    this.oldest = Math.max(this.oldest, this.next - this.capacity);
+    const slot = this.end % this.capacity;
+    this.end++;
+    this.begin = Math.max(this.begin, this.end - this.capacity);
     this.t_s[slot] = t_s;
     this.lost[slot] = lost;
     this.valid[slot] = this.saturated[slot] = this.doubtful[slot] = 0;

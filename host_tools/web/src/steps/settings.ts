@@ -79,6 +79,17 @@ export function commandsFor(info: Info, typed: Partial<Record<Name, string>>): C
   return [...commands.values()] as unknown as Command[];
 }
 
+/** One after the other, up to one that is refused; what it has then is known in any case. */
+export async function set(fingertip: Fingertip, commands: readonly Command[]): Promise<void> {
+  try {
+    for (const command of commands) {
+      await fingertip.command(command);
+    }
+  } finally {
+    await fingertip.askInfo();
+  }
+}
+
 export function settings(fingertip: Fingertip): void {
   const { info } = fingertip;
   if (!info) {
@@ -117,10 +128,8 @@ export function settings(fingertip: Fingertip): void {
   show(info);
 
   const send = async (commands: Command[], message: string): Promise<void> => {
-    for (const command of commands) {
-      await fingertip.command(command);
-    }
-    show(await fingertip.askInfo());
+    await set(fingertip, commands);
+    show(fingertip.info ?? info);
     dialog.setMessage(message);
   };
   const changed = (): Command[] =>

@@ -27,10 +27,8 @@ async function tared(fingertip: Fingertip): Promise<void> {
   const end = fingertip.tap((packet) => {
     is_tared ||= (packet.type === CONTACT || packet.type === RAW) && (packet.flags & Flag.TARED) !== 0;
   });
-  for (
-    const until_ms = performance.now() + PATIENCE.tared_ms;
-    !is_tared && fingertip.state !== 'closed' && performance.now() < until_ms;
-  ) {
+  const until_ms = performance.now() + PATIENCE.tared_ms;
+  while (!is_tared && fingertip.state !== 'closed' && performance.now() < until_ms) {
     await pause(20);
   }
   end();

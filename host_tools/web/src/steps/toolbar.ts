@@ -1,7 +1,8 @@
 /** The buttons of the page and of each fingertip. */
 import { Capability } from '../line/line_facts';
+import { hasWebSerial } from '../line/serial_line';
 import type { Fingertip } from '../model/fingertip';
-import { beginning, button, element, wordsOf } from '../view/elements';
+import { MAIN, button, element, wordsOf } from '../view/elements';
 import type { App } from './app';
 import { calibrate } from './calibrate';
 import { examine } from './doctor';
@@ -11,6 +12,13 @@ import { settings } from './settings';
 import { tare } from './tare';
 
 const SPEEDS = [0.25, 0.5, 1, 2, 5, 20];
+
+/** The buttons that bring a fingertip; where the browser reaches no serial port, the simulated one comes first. */
+export function begin(app: App, connect: string, simulate: string): HTMLButtonElement[] {
+  const [here, there] = hasWebSerial() ? [MAIN, {}] : [{}, MAIN];
+  const buttons = [button(connect, () => void app.connect(), here), button(simulate, () => app.simulate(), there)];
+  return hasWebSerial() ? buttons : buttons.reverse();
+}
 
 /** "Connect", "Simulate", "Replay a file"; files may also be dropped on the page. */
 export function pageControls(app: App): HTMLElement {
@@ -32,11 +40,7 @@ export function pageControls(app: App): HTMLElement {
   return element(
     'div',
     { class: 'controls', role: 'group', 'aria-label': 'Page' },
-    ...beginning(
-      ['Connect', 'Simulate'],
-      () => void app.connect(),
-      () => app.simulate(),
-    ),
+    ...begin(app, 'Connect', 'Simulate'),
     button('Replay a file', () => input.click()),
     input,
   );

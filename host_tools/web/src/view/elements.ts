@@ -1,6 +1,4 @@
 /** Small makers of what the page is built of. */
-import { hasWebSerial } from '../line/serial_line';
-
 type Child = Node | string;
 type Attributes = Record<string, string | number | boolean | undefined>;
 
@@ -33,13 +31,6 @@ export function paragraph(text = ''): HTMLParagraphElement {
 
 /** The button that is most likely wanted. */
 export const MAIN = { class: 'main' };
-
-/** Where the browser reaches no serial port, the simulated one comes first. */
-export function beginning(words: readonly [string, string], connect: () => void, simulate: () => void): HTMLButtonElement[] {
-  const serial = hasWebSerial();
-  const buttons = [button(words[0], connect, serial ? MAIN : {}), button(words[1], simulate, serial ? {} : MAIN)];
-  return serial ? buttons : buttons.reverse();
-}
 
 /** The text of an error, for people. */
 export function wordsOf(error: unknown): string {

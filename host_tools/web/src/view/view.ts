@@ -6,7 +6,7 @@ import '../styles/page.css';
 import '../styles/steps.css';
 import type { Fingertip } from '../model/fingertip';
 import type { History } from '../model/history';
-import { beginning, button, element, write } from './elements';
+import { button, element, write } from './elements';
 import { HealthPanel } from './health';
 import { factsOf } from './health_facts';
 import { leaving } from './notices';
@@ -22,10 +22,10 @@ import { Traces } from './traces';
 export interface Controls {
   /** Connect, replay and what else concerns no single fingertip. */
   readonly page: HTMLElement;
+  /** What one begins with. */
+  readonly begin: readonly HTMLElement[];
   /** Tare, record and so on; asked for once for each. */
   of(fingertip: Fingertip): HTMLElement;
-  connect(): void;
-  simulate(): void;
 }
 
 /** All fingertips of the page, and who listens to their coming and going. */
@@ -71,8 +71,7 @@ export class View {
     const themes = this.root.querySelector<HTMLSelectElement>('.themes')!;
     themes.value = theme();
     themes.addEventListener('change', () => setTheme(themes.value as Theme));
-    const words = ['Connect a fingertip', 'Try the simulated one'] as const;
-    this.part('begin').append(...beginning(words, this.controls.connect, this.controls.simulate));
+    this.part('begin').append(...this.controls.begin);
     this.part('hand-place').before(this.numbers.element);
     this.part('over-time').append(this.traces.element, this.timeline.element);
     this.part('behind').append(this.health.element);
