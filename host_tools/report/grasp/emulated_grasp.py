@@ -14,9 +14,6 @@ CLOCKS_ppm = "25,-25"
 COURSE = {
     "measured_ms": "the first frame that reported SLIDING was measured",
     "sent_ms": "its packet had left the chip",
-    "answered_ms": "the controller's command changed",
-    "asked_ms": "it went out on the gripper's line",
-    "moved_ms": "the fingers moved",
     "reaction_ms": "the grip was 5 % stronger",
 }
 

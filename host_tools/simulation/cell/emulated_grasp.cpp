@@ -190,7 +190,6 @@ public:
       }
       if (gripper_.next_s() <= t_s_) {
         line_.push_back(gripper_.exchange(command_));
-        note();
       }
     }
   }
@@ -218,24 +217,11 @@ private:
     double arrived_s, measured_s;
     bool slides;
   };
-  // Commanded, sent, and of the fingers.
-  struct Widths {
-    double at_s;
-    std::array<double, 3> mm;
-  };
-
-  void note() {
-    const std::array<double, 3> now_mm = {command_.width_mm, gripper_.sent().width_mm, gripper_.motion().width_mm()};
-    if (widths_.empty() || widths_.back().mm != now_mm) {
-      widths_.push_back({t_s_, now_mm});
-    }
-  }
 
   void step_controller() {
-    report_ = controller_->step(t_s_, command_);
-    note();
-    if (report_.state == GRIP_HOLDING || report_.state == GRIP_SLIPPING) {
-      trouble_ |= report_.trouble;
+    const GripReport report = controller_->step(t_s_, command_);
+    if (report.state == GRIP_HOLDING || report.state == GRIP_SLIPPING) {
+      trouble_ |= report.trouble;
       holds_s_ = std::min(holds_s_, t_s_);
     }
   }
@@ -249,7 +235,6 @@ private:
     }
     world_.advance(to_s - t_s_);
     t_s_ = to_s;
-    note();
     over_ = world_.is_dropped() || t_s_ - lift_s_ >= grasp_.ends_s;
   }
 
@@ -257,23 +242,11 @@ private:
     const auto first = std::find_if(reports_.begin(), reports_.end(),
                                     [&](const Report &report) { return report.slides && report.arrived_s >= slip.begin_s; });
     const bool is_reported = first != reports_.end();
-    // The first step that closes further than the width before it.
-    const auto closed = [&](std::size_t which) {
-      for (std::size_t i = 1; i < widths_.size(); i++) {
-        if (widths_[i].at_s >= slip.begin_s && widths_[i].mm[which] < widths_[i - 1].mm[which]) {
-          return widths_[i].at_s - slip.begin_s;
-        }
-      }
-      return NEVER_s;
-    };
     const auto in_ms = [](double s) { return to_us(s, 1e3); };
     return {{"begin_s", to_us(slip.begin_s)},
             {"way_mm", slip.way_mm},
             {"measured_ms", in_ms(is_reported ? first->measured_s - slip.begin_s : NEVER_s)},
             {"sent_ms", in_ms(is_reported ? first->arrived_s - slip.begin_s : NEVER_s)},
-            {"answered_ms", in_ms(closed(0))},
-            {"asked_ms", in_ms(closed(1))},
-            {"moved_ms", in_ms(closed(2))},
             {"reaction_ms", in_ms(slip.reaction_s.value_or(NEVER_s))}};
   }
 
@@ -284,13 +257,11 @@ private:
   std::unique_ptr<CoreController> controller_; // none before both are ready
   std::deque<GripperLine::Answer> line_;
   GripCommand command_{};
-  GripReport report_{};
   double t_s_ = 0.0, holds_s_ = NEVER_s, lift_s_ = NEVER_s, asked_s_ = 0.0;
   std::uint32_t trouble_ = 0;
   bool over_ = false;
   std::array<std::size_t, 2> frames_{}, loads_{}; // since both are ready
   std::vector<Report> reports_;
-  std::vector<Widths> widths_;
 };
 
 void read_whole(void *to, std::size_t length) {
