@@ -145,7 +145,7 @@ TEST(Calibration, finds_the_minimum_that_ceres_finds) {
     for (std::size_t i = 0; i < placements.size(); i++) {
       placements[i].earlier_Pa = i ? placements[i - 1].reading_Pa : std::vector<double>(SENSORS);
     }
-    const Solution solution = solve(pad.array, placements, {}, true);
+    const Solution solution = solve(pad.array, placements, true);
     ASSERT_TRUE(solution.solved);
     Random start(seed, 7, 0);
     const Found found = by_ceres(pad.array, placements, solution, start);

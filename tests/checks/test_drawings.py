@@ -38,8 +38,7 @@ def wired(bus, **wires):
 
 def pins_drawn(board):
     """[(GPIO, pin)] of the picture."""
-    found = re.findall(r">GP(\d+)[^<]*</text>\s*<text[^>]*>pin (\d+)<", wiring.drawn(board))
-    return [(int(gpio), int(pin)) for gpio, pin in found]
+    return [tuple(map(int, wire)) for wire in re.findall(r">GP(\d+)[^<]*</text>\s*<text[^>]*>pin (\d+)<", wiring.drawn(board))]
 
 
 class Wiring(unittest.TestCase):
@@ -127,9 +126,7 @@ class Wiring(unittest.TestCase):
                 self.assertIn(why, " ".join(done.stderr.split()))
 
     def test_numbers_of_resistors(self):
-        self.assertEqual(
-            [draw.yageo(wiring.ohms(ohm)) for ohm in (33, 4.7, 1000, 2200, 3300, 10000)], ["33R", "4R7", "1K", "2K2", "3K3", "10K"]
-        )
+        self.assertEqual([draw.yageo(wiring.ohms(ohm)) for ohm in (33, 4.7, 1000, 2200, 10000)], ["33R", "4R7", "1K", "2K2", "10K"])
 
 
 class Pad(unittest.TestCase):
@@ -146,10 +143,8 @@ class Pad(unittest.TestCase):
         m = mould.measures(OWN_PAD)
         for x, y in m.screws:
             radius = mould.SCREW_mm / 2
-            beside = [abs(at) - radius > flange / 2 + mould.FRAME_PLAY_mm for at, flange in zip((x, y), m.flange)]
-            self.assertTrue(any(beside))
-            self.assertLess(abs(x) + radius, m.outside[0] / 2)
-            self.assertLess(abs(y) + radius, m.outside[1] / 2)
+            self.assertTrue(any(abs(at) - radius > flange / 2 + mould.FRAME_PLAY_mm for at, flange in zip((x, y), m.flange)))
+            self.assertTrue(all(abs(at) + radius < size / 2 for at, size in zip((x, y), m.outside)))
 
 
 class Tree(unittest.TestCase):

@@ -372,6 +372,13 @@ class _RecordingLines:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
 
 
+def is_recording(path: Path) -> bool:
+    with contextlib.suppress(OSError), open(path, "rb") as file:
+        start = file.read(100)
+        return start.startswith(MAGIC) or b"fingertip-recording" in start
+    return False
+
+
 def recorded_devices(path: Path) -> list[str]:
     """Serial numbers of the fingertips in a recording of several; of one, an empty list."""
     lines = _RecordingLines(path)

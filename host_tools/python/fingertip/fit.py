@@ -24,7 +24,7 @@ import numpy.typing as npt
 from .arrays import Firmware, MeasureError, q10, round_half_away, table_of, usable_of
 from .command import check_output, printable, progress, reporter, run_tool
 from .errors import InputError
-from .files import write_text
+from .files import is_recording, read_recording, write_text
 from .line import SENSORS_MAX, Flag
 
 FloatArray = npt.NDArray[np.float64]
@@ -135,7 +135,7 @@ def _calibrated(what: Described | None, pad: Pad) -> Mapping[str, Any]:
     if known.get("force_scale") and "force_scale_sd" not in known:
         wrong = "force_scale comes without its standard deviation, force_scale_sd"
     if wrong:
-        raise InputError(f"the calibration is none of this pad: {wrong}; fingertip fit --calibrate makes one")
+        raise InputError(f"the calibration is none of this pad: {wrong}; fingertip calibrate --from FILE --pad NAME makes one")
     return known
 
 
@@ -155,9 +155,8 @@ def _gates_Pa(noise_Pa: float) -> tuple[float, float]:
     return open_Pa, close_Pa
 
 
-def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noise_Pa: float, follow: bool = False) -> FloatArray:
-    """Pa above the zero [row, sensor]; follow: rows follow each other in time. Raises InputError where they cannot be those of touches on the
-    pad, warns of what makes that unlikely."""
+def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noise_Pa: float, time_s: npt.ArrayLike | None) -> FloatArray:
+    """Pa above the zero [row, sensor]. Raises InputError where they cannot be those of touches on the pad, warns of what makes that unlikely."""
     if unit not in UNITS:
         raise InputError(f"{printable(unit)} is no unit; give one of {', '.join(UNITS)}")
     table: FloatArray = UNITS[unit] * table_of(pressures)
@@ -165,6 +164,8 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
         raise InputError(
             f"pressures are {' x '.join(map(str, table.shape))}, and pad {pad.name} has {len(pad.x_mm)} sensors: rows x {len(pad.x_mm)}"
         )
+    if time_s is not None and (np.shape(time_s) != (len(table),) or not (np.diff(np.asarray(time_s, float)) > 0).all()):
+        raise InputError("time does not rise from row to row; without a time each row is a contact of its own")
     if not 0 <= zero_rows <= len(table) or not 0 < noise_Pa < MOST_Pa:
         raise InputError(f"{zero_rows} rows at rest of {len(table)}, noise of {noise_Pa:g} Pa: give rows that are there, and noise above 0")
     if np.isinf(table).any() or not np.isfinite(table[: zero_rows or None]).any():
@@ -175,7 +176,7 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
     middle_Pa = float(np.median(level_Pa))
     alike = np.abs(level_Pa - middle_Pa).max(initial=0.0) < ALIKE * abs(middle_Pa)
     airs = [name for name, factor in UNITS.items() if alike and AIR_Pa[0] < factor * middle_Pa / UNITS[unit] < AIR_Pa[1]]
-    scatter_Pa = _noise_Pa(rest[:, seen]) if zero_rows or follow else 0.0
+    scatter_Pa = _noise_Pa(rest[:, seen]) if zero_rows or time_s is not None else 0.0
     open_Pa = _gates_Pa(max(noise_Pa, scatter_Pa))[0]
     touch_Pa = 0.0
     if zero_rows:
@@ -265,7 +266,7 @@ def fit(
     with the 24 before it in its contact. Raises InputError, with the cause. A row takes a millisecond, or without a thickness 20 us."""
     of_pad = read_pad(pad)
     known = _calibrated(calibration, of_pad)
-    reading_Pa = _readings(pressures, of_pad, unit, zero_rows, noise_Pa, time_s is not None)
+    reading_Pa = _readings(pressures, of_pad, unit, zero_rows, noise_Pa, time_s)
     chip = firmware()
     profile = None
     if of_pad.thickness_mm:
@@ -277,10 +278,7 @@ def fit(
     rows = np.arange(len(readings))
     alone = np.ones(len(rows), bool)
     if time_s is not None:
-        times_s = np.asarray(time_s, float)
-        steps_s = np.diff(times_s) if times_s.shape == rows.shape else np.zeros(1)
-        if not (steps_s > 0).all():
-            raise InputError("time does not rise from row to row; without a time each row is a contact of its own")
+        steps_s = np.diff(np.asarray(time_s, float))
         alone[1:] = steps_s > GAP * np.median(steps_s) if len(steps_s) else False
     begins = _begins(readings.max(axis=1) / 1024.0, noise_Pa, alone)
     if time_s is not None and alone[1:].any():
@@ -392,23 +390,30 @@ def calibrate(
     pad: Described,
     *,
     force_N: float | None = None,
+    time_s: npt.ArrayLike | None = None,
     unit: str = "Pa",
     zero_rows: int = 0,
     noise_Pa: float = NOISE_Pa,
 ) -> dict[str, Any]:
-    """What the tool's calibration finds of rows of one weight, of force_N if it is known, at different places: at most 40 of them, from
-    all over the file. As fit() takes it. Raises InputError where they do not determine the gains."""
+    """What the tool's calibration finds of one weight, of force_N if it is known, at different places, as fit() takes it. Of rows without a
+    time each is a placement, and at most 40 of them count, from all over the file. time_s [row]: rows follow each other, and the weight
+    was set down, rested for a second and was lifted again. Raises InputError where they do not determine the gains."""
     if force_N is not None and not 0.1 <= force_N <= 50:
         raise InputError(f"a weight of {force_N:g} N is out of range; give 0.1 to 50 N, which are 10 to 5100 grams")
     of_pad = read_pad(pad)
-    reading_Pa = _readings(pressures, of_pad, unit, zero_rows, noise_Pa)
-    pressed = np.flatnonzero(np.nan_to_num(reading_Pa).max(axis=1) >= PLACEMENT_Pa)
-    reading_Pa = reading_Pa[pressed[np.linspace(0, len(pressed) - 1, min(PLACEMENTS, len(pressed))).astype(int)]]
-    t_s = EVERY_s * np.arange(len(reading_Pa))
-    found, sensors, _ = firmware().calibrate(*of_pad[1:4], t_s[None], reading_Pa[None], noise_Pa, force_N=force_N or 1.0)
-    if found[0]["state"] != 1:
-        raise InputError(f"not calibrated from {len(t_s)} placements: {found[0]['text'].decode()}")
-    return response_of(found[0], sensors[0]) | ({} if force_N else {"force_scale": 0.0, "force_scale_sd": 0.0})
+    reading_Pa = _readings(pressures, of_pad, unit, zero_rows, noise_Pa, time_s)
+    from .validation.placements import Placement, placements_of, solve_gains  # which need this module
+
+    if time_s is None:
+        pressed = np.flatnonzero(np.nan_to_num(reading_Pa).max(axis=1) >= PLACEMENT_Pa)
+        chosen = reading_Pa[pressed[np.linspace(0, len(pressed) - 1, min(PLACEMENTS, len(pressed))).astype(int)]]
+        placements = [Placement(EVERY_s * i, np.nan_to_num(row), np.isfinite(row), 0 * row, noise_Pa, 0.0) for i, row in enumerate(chosen)]
+    else:
+        placements = placements_of(np.asarray(time_s, float), reading_Pa)
+    *_, found, sensors = solve_gains(of_pad, placements, force_N or 1.0)
+    if found["state"] != 1:
+        raise InputError(f"not calibrated from {len(placements)} placements: {found['text'].decode()}")
+    return response_of(found, sensors) | ({} if force_N else {"force_scale": 0.0, "force_scale_sd": 0.0})
 
 
 def read_numbers(path: str) -> tuple[list[str], FloatArray]:
@@ -468,6 +473,19 @@ def read_table(path: str, sensors: int, first: int | None = None, time: int | No
     return table[:, begin : begin + sensors], None if column is None else table[:, column - 1]
 
 
+def _recorded(path: str, device: str | None) -> tuple[FloatArray, FloatArray, Mapping[str, Any]]:
+    """(Pa above the fingertip's own zero [row, sensor], time, pad) of a recording. Frames whose pressures were lost are left out."""
+    recording = read_recording(path, serial=device)
+    known, pressures = recording.metadata, recording.sensors_Pa - recording.tare_Pa
+    valid, *wrong = (np.nan_to_num(recording[name]).astype(np.int64) for name in ("valid", "saturated", "doubtful"))
+    pressures[((valid & ~wrong[0] & ~wrong[1])[:, None] >> np.arange(pressures.shape[1])) & 1 == 0] = np.nan
+    there = np.isfinite(pressures).any(axis=1)
+    places = [[float(each) for each in known.get(name, "").split()] for name in ("x_mm", "y_mm")]
+    rubber = {name: known.get(f"pad_{name}", 0) for name in ("thickness_mm", "overhang_mm")}
+    pad = {"name": known.get("serial", path), "pitch_mm": known.get("pitch_mm"), "places_mm": list(zip(*places)), "rubber": rubber}
+    return pressures[there], recording["t_us"][there] / 1e6, pad
+
+
 def _rises(values: FloatArray) -> bool:
     """Evenly, but for gaps."""
     steps = np.diff(values)
@@ -476,8 +494,11 @@ def _rises(values: FloatArray) -> bool:
 
 def main(argv: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="fingertip fit", description=(__doc__ or "").split(":")[0] + ".", allow_abbrev=False)
-    parser.add_argument("file", metavar="FILE.csv", help="a column for each sensor, and perhaps one of the time before; -: standard input")
-    parser.add_argument("--pad", required=True, metavar="NAME|FILE.json", help="one of the tool's pads, or a file that describes it")
+    parser.add_argument(
+        "file", metavar="FILE.csv", help="a column for each sensor, and perhaps one of the time before; or a recording; -: standard input"
+    )
+    parser.add_argument("--pad", metavar="NAME|FILE.json", help="one of the tool's, or a file that describes it; default: a recording's")
+    parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in a recording")
     parser.add_argument("--first", type=int, metavar="N", help="column of sensor 0, counted from 1; the others follow it")
     parser.add_argument("--time", type=int, metavar="N", help="column of the time in seconds; without one each row is a contact of its own")
     parser.add_argument("--unit", default="Pa", metavar="UNIT", help=f"{', '.join(UNITS)}; default: Pa")
@@ -485,8 +506,8 @@ def main(argv: list[str]) -> int:
         "--zero", type=int, default=0, metavar="ROWS", help="number of rows at rest at the beginning: their mean is the zero"
     )
     parser.add_argument("--noise", type=float, default=NOISE_Pa, metavar="PA", help="of a reading, rms; default: %(default)g")
-    parser.add_argument("--calibration", metavar="FILE.json", help="what --calibrate wrote")
-    parser.add_argument("--calibrate", action="store_true", help="find the sensors' gains instead, of one weight at different places")
+    parser.add_argument("--calibration", metavar="FILE.json", help="what fingertip calibrate --pad wrote")
+    parser.add_argument("--calibrate", action="store_true", help="find the gains instead: fingertip calibrate --from FILE --pad NAME")
     parser.add_argument("--weight", type=float, metavar="GRAMS", help="its mass: then forces are calibrated too")
     parser.add_argument("-o", "--output", metavar="FILE", help="default: standard output")
     parser.add_argument("--overwrite", action="store_true", help="replace it if it exists")
@@ -498,16 +519,18 @@ def main(argv: list[str]) -> int:
     warn = reporter(parser.prog)
     warnings.showwarning = lambda message, *_: warn(f"warning: {message}")
     if options.output is not None:
-        pad = options.pad if options.pad.endswith(".json") else None
-        check_output(options.output, options.file, options.calibration, pad, replace=options.overwrite)
-    pressures, time_s = read_table(options.file, len(read_pad(options.pad).x_mm), options.first, options.time)
-    common = {"unit": options.unit, "zero_rows": options.zero, "noise_Pa": options.noise}
+        described = options.pad if options.pad and options.pad.endswith(".json") else None
+        check_output(options.output, options.file, options.calibration, described, replace=options.overwrite)
+    recorded = _recorded(options.file, options.device) if options.first is None and is_recording(options.file) else None
+    pad = options.pad or (recorded and recorded[2]) or parser.error("--pad NAME, or FILE.json, is needed: what the columns are of")
+    pressures, time_s = recorded[:2] if recorded else read_table(options.file, len(read_pad(pad).x_mm), options.first, options.time)
+    common = {"unit": options.unit, "zero_rows": options.zero, "noise_Pa": options.noise, "time_s": time_s}
     if options.calibrate:
         force_N = None if options.weight is None else 9.80665e-3 * options.weight
-        text = json.dumps(calibrate(pressures, options.pad, force_N=force_N, **common), indent=1) + "\n"
+        text = json.dumps(calibrate(pressures, pad, force_N=force_N, **common), indent=1) + "\n"
     else:
         with progress("fitting") as show:
-            found = fit(pressures, options.pad, calibration=options.calibration, time_s=time_s, progress=show, **common)
+            found = fit(pressures, pad, calibration=options.calibration, progress=show, **common)
         columns = ({} if time_s is None else {"t_s": time_s}) | found
         text = "".join(f"{','.join(cells)}\n" for cells in [columns, *zip(*(_texts(values, name) for name, values in columns.items()))])
     write_text(options.output, text) if options.output is not None else sys.stdout.write(text)

@@ -18,9 +18,11 @@ MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(text), FIELD(solv
 
 MEASURE_RECORD(calibrated_sensor, FIELD(gain), FIELD(gain_sd), FIELD(reading_sd), FIELD(off_x_mm), FIELD(off_y_mm), FIELD(wider))
 
-static calibration found_by(const Judgement &judgement, const Shape &shape) {
-  const Solution &solution = judgement.solution;
-  calibration found{};
+void fingertip::measure::describe(const Array &layout, const std::vector<Placement> &placements, const Judgement &judgement, double force_N,
+                                  calibration &found, calibrated_sensor *sensors, fit_own *own) {
+  const Solution &solution = judgement.solution, &stored = judgement.kept;
+  const Shape shape = shape_of(stored);
+  found = {};
   found.state = static_cast<std::int32_t>(judgement.state);
   std::strncpy(found.reason, name_of(judgement.reason), sizeof found.reason - 1);
   std::strncpy(found.text, judgement.text.c_str(), sizeof found.text - 1);
@@ -43,15 +45,7 @@ static calibration found_by(const Judgement &judgement, const Shape &shape) {
   found.position_mm = solution.spread.position_mm;
   found.halves_shape = judgement.halves_shape;
   found.halves_gauge = judgement.halves_gauge;
-  return found;
-}
-
-void fingertip::measure::describe(const Array &layout, const std::vector<Placement> &placements, const Judgement &judgement, double force_N,
-                                  calibration &found, calibrated_sensor *sensors, fit_own *own) {
-  const Solution &solution = judgement.kept;
-  const Shape shape = shape_of(solution);
-  found = found_by(judgement, shape);
-  if (const auto scale = force_scale(layout, placements, solution, force_N, shape); solution.solved && scale) {
+  if (const auto scale = force_scale(layout, placements, stored, force_N, shape); stored.solved && scale) {
     found.force_scale = scale->scale;
     found.force_scale_sd = scale->sd;
   }
@@ -62,7 +56,7 @@ void fingertip::measure::describe(const Array &layout, const std::vector<Placeme
   for (std::size_t k = 0; k < layout.sensors(); k++) {
     const auto at = [&](const std::vector<double> &values) { return k < values.size() ? values[k] : 0.0; };
     const Own sensor = k < shape.own.size() ? shape.own[k] : Own{};
-    sensors[k] = {at(solution.gain), at(solution.gain_sd), at(solution.reading_sd), sensor.off_x_mm, sensor.off_y_mm, sensor.wider};
+    sensors[k] = {at(stored.gain), at(stored.gain_sd), at(stored.reading_sd), sensor.off_x_mm, sensor.off_y_mm, sensor.wider};
   }
 }
 

@@ -10,6 +10,8 @@ extern "C" {
 #include "fit/fit.h"
 }
 
+namespace fingertip::measure {
+
 // What a session ends with, and what the tool would keep of it.
 struct calibration {
   std::int32_t state;         // 0: more, 1: good, 2: refused
@@ -28,7 +30,6 @@ struct calibrated_sensor {
   double gain, gain_sd, reading_sd; // reading_sd: what the firmware gets as the gain's
   double off_x_mm, off_y_mm, wider;
 };
-namespace fingertip::measure {
 
 // sensors, own: [sensor]; own is zeros unless has_own. force_N: of each placement.
 void describe(const calibrating::Array &layout, const std::vector<calibrating::Placement> &placements,

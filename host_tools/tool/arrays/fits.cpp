@@ -10,6 +10,7 @@ extern "C" {
 }
 
 #include <ctime>
+#include <map>
 
 using namespace fingertip::measure;
 using fingertip::twin::in_parallel;
@@ -53,25 +54,15 @@ MEASURE_ENTRY(default_settings)
 using Kernel = void (*)(const fit_array *, const std::int32_t *, sensor_map, const fit_settings *, fit_result *);
 
 static Kernel kernel_named(const std::string &name) {
-  if (name == "fit") {
-    return fit_gaussian;
-  }
-  if (name == "fit_grid") {
-    return fit_gaussian_grid;
-  }
-  if (name == "grid") {
-    return [](const fit_array *array, const std::int32_t *pressure_Pa_q10, sensor_map, const fit_settings *settings, fit_result *result) {
-      fit_grid(array, pressure_Pa_q10, settings, result);
-    };
-  }
-  if (name == "masked") {
-    return [](const fit_array *array, const std::int32_t *pressure_Pa_q10, sensor_map usable, const fit_settings *settings,
-              fit_result *result) { fit_grid_masked(array, pressure_Pa_q10, usable, settings, result); };
-  }
-  if (name == "general") {
-    return fit_general;
-  }
-  throw std::invalid_argument("no kernel has the name " + name);
+  const auto grid = [](const fit_array *array, const std::int32_t *pressure_Pa_q10, sensor_map, const fit_settings *settings,
+                       fit_result *result) { fit_grid(array, pressure_Pa_q10, settings, result); };
+  const auto masked = [](const fit_array *array, const std::int32_t *pressure_Pa_q10, sensor_map usable, const fit_settings *settings,
+                         fit_result *result) { fit_grid_masked(array, pressure_Pa_q10, usable, settings, result); };
+  const std::map<std::string, Kernel> kernels = {
+      {"fit", fit_gaussian}, {"fit_grid", fit_gaussian_grid}, {"grid", grid}, {"masked", masked}, {"general", fit_general}};
+  const auto found = kernels.find(name);
+  require(found != kernels.end(), "no kernel has this name");
+  return found->second;
 }
 
 // kernel: "grid", "masked", "general", "fit" (fit_gaussian) or "fit_grid" (fit_gaussian_grid). us: of one fit, if a

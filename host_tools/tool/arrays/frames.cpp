@@ -29,24 +29,21 @@ MEASURE_RECORD(contact_result, FIELD(flags), FIELD(slip_mm))
 
 // Of this build, as the headers of these names have them.
 struct firmware_constants {
-  double sensor_max_pressure_Pa, default_gain_sd, default_model_sd, location_sd_limit_mm;
-  std::int32_t zero_tare_frames, default_fit_iterations;
+  double sensor_max_pressure_Pa, default_gain_sd, location_sd_limit_mm;
+  std::int32_t zero_tare_frames;
   std::int32_t tangential_frames, shapes_frames;                           // until the first answer
   double gate_open_Pa, gate_open_noises, gate_close_Pa, gate_close_noises; // of the largest reading
   double default_force_scale_sd;
 };
-MEASURE_RECORD(firmware_constants, FIELD(sensor_max_pressure_Pa), FIELD(default_gain_sd), FIELD(default_model_sd),
-               FIELD(location_sd_limit_mm), FIELD(zero_tare_frames), FIELD(default_fit_iterations), FIELD(tangential_frames),
-               FIELD(shapes_frames), FIELD(gate_open_Pa), FIELD(gate_open_noises), FIELD(gate_close_Pa), FIELD(gate_close_noises),
-               FIELD(default_force_scale_sd))
+MEASURE_RECORD(firmware_constants, FIELD(sensor_max_pressure_Pa), FIELD(default_gain_sd), FIELD(location_sd_limit_mm),
+               FIELD(zero_tare_frames), FIELD(tangential_frames), FIELD(shapes_frames), FIELD(gate_open_Pa), FIELD(gate_open_noises),
+               FIELD(gate_close_Pa), FIELD(gate_close_noises), FIELD(default_force_scale_sd))
 
 static void constants_of_build(Batch<firmware_constants, 1> constants) {
   constants[0] = {static_cast<double>(MS58XX_MAX_PRESSURE_Pa),
                   static_cast<double>(DEFAULT_GAIN_SD),
-                  static_cast<double>(DEFAULT_MODEL_SD),
                   static_cast<double>(FIT_LOCATION_SD_LIMIT_mm),
                   ZERO_TARE_FRAMES,
-                  DEFAULT_FIT_ITERATIONS,
                   FIT_TANGENTIAL_FRAMES,
                   FIT_SHAPES_FRAMES,
                   GATE_OPEN_Pa,

@@ -51,20 +51,15 @@ static published published_of(const pad_profile &profile, double force_scale, do
   found.gaussian_x_mm = number(fit.x_mm);
   found.gaussian_y_mm = number(fit.y_mm);
   found.gaussian_force_N = scale * number(fit.force_N);
+  found.x_mm = found.valid ? number(load.x_mm) : found.gaussian_x_mm;
+  found.y_mm = found.valid ? number(load.y_mm) : found.gaussian_y_mm;
+  found.location_sd_mm = number(found.valid ? load.location_sd_mm : fit.location_sd_mm);
+  found.force_N = found.valid ? number(load.force_N) : found.gaussian_force_N;
   if (found.valid) {
-    found.x_mm = number(load.x_mm);
-    found.y_mm = number(load.y_mm);
-    found.location_sd_mm = number(load.location_sd_mm);
-    found.force_N = number(load.force_N);
     found.force_sd_N = number(load.force_sd_N);
     found.qx = number(load.qx_N) / found.force_N;
     found.qy = number(load.qy_N) / found.force_N;
     found.q_sd = number(load.q_sd_N) / found.force_N;
-  } else {
-    found.x_mm = found.gaussian_x_mm;
-    found.y_mm = found.gaussian_y_mm;
-    found.location_sd_mm = number(fit.location_sd_mm);
-    found.force_N = found.gaussian_force_N;
   }
   return found;
 }

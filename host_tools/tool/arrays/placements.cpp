@@ -2,11 +2,10 @@
 #include "tool/calibration/placements.hpp"
 
 #include "library/pad/profile.hpp"
+#include "tool/arrays/calibrations.hpp"
 #include "tool/arrays/places.hpp"
-#include "tool/calibration/judge.hpp"
 
 #include <algorithm>
-#include <cstring>
 
 using namespace fingertip::calibrating;
 using namespace fingertip::measure;
@@ -19,14 +18,11 @@ MEASURE_RECORD(found_placement, FIELD(t_s), FIELD(noise_Pa), FIELD(fading), FIEL
 
 // force_scale: 0 where there is none.
 struct solved_placements {
-  bool solved;
-  char judgement[512];
   double peak_Pa, width_mm, mixing, dip, dip_share, dip_sd_mm; // as Solution has them
   double sigma_mm, thickness_mm, thickness_sd_mm, force_scale, force_ratio;
 };
-MEASURE_RECORD(solved_placements, FIELD(solved), FIELD(judgement), FIELD(peak_Pa), FIELD(width_mm), FIELD(mixing), FIELD(dip),
-               FIELD(dip_share), FIELD(dip_sd_mm), FIELD(sigma_mm), FIELD(thickness_mm), FIELD(thickness_sd_mm), FIELD(force_scale),
-               FIELD(force_ratio))
+MEASURE_RECORD(solved_placements, FIELD(peak_Pa), FIELD(width_mm), FIELD(mixing), FIELD(dip), FIELD(dip_share), FIELD(dip_sd_mm),
+               FIELD(sigma_mm), FIELD(thickness_mm), FIELD(thickness_sd_mm), FIELD(force_scale), FIELD(force_ratio))
 
 static void finder_new(std::int64_t sensors, Batch<std::int64_t, 1> finder) {
   require(sensors > 0 && sensors <= FT_MAX_SENSORS && finder.size() == 1, "no number of sensors");
@@ -58,16 +54,19 @@ static void finder_take(std::int64_t finder, double t_s, std::int64_t valid, Bat
 }
 MEASURE_ENTRY(finder_take)
 
-// levels: [placement][reading, rest][sensor], in the order of time; force_N: of each. gains: [gain, sd][sensor].
+// levels: [placement][reading, rest][sensor], in the order of time; force_N: of each. gains: [gain, sd][sensor]. kept, kept_sensors: what
+// the tool would keep.
 static void solve_placements(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm, double force_N,
                              Batch<const found_placement, 1> placements, Batch<const double, 3> levels, Batch<solved_placements, 1> solved,
-                             Batch<double, 2> gains) {
+                             Batch<double, 2> gains, Batch<fingertip::measure::calibration, 1> kept,
+                             Batch<calibrated_sensor, 1> kept_sensors) {
   same_length(x_mm, y_mm);
   same_length(placements, levels);
   const std::size_t sensors = x_mm.size();
   require(sensors > 0 && sensors <= FT_MAX_SENSORS, "no number of sensors");
-  require(levels.size(1) == 2 && levels.size(2) == sensors && gains.size(1) == sensors, "another number of sensors");
-  require(solved.size() == 1 && gains.size() == 2, "no room for what is found");
+  require(levels.size(1) == 2 && levels.size(2) == sensors && gains.size(1) == sensors && kept_sensors.size() == sensors,
+          "another number of sensors");
+  require(solved.size() == 1 && gains.size() == 2 && kept.size() == 1, "no room for what is found");
   const Array array{pitch_mm, {x_mm.data, x_mm.data + sensors}, {y_mm.data, y_mm.data + sensors}};
   check_places(array);
   std::vector<Placement> all(placements.size());
@@ -81,11 +80,10 @@ static void solve_placements(Batch<const double, 1> x_mm, Batch<const double, 1>
     all[i].rest_Pa.assign(reading_Pa + sensors, reading_Pa + 2 * sensors);
   }
   const Judgement judgement = judge(array, all, true);
+  describe(array, all, judgement, force_N, kept[0], kept_sensors.data, std::vector<fit_own>(sensors).data());
   const Solution &solution = judgement.solution;
   solved_placements &found = solved[0];
-  std::strncpy(found.judgement, judgement.text.c_str(), sizeof found.judgement - 1);
-  found.solved = solution.solved;
-  if (!found.solved) {
+  if (!solution.solved) {
     return;
   }
   const fingertip::pad::Thickness thickness = fingertip::pad::thickness_of(solution.sigma_mm, solution.sigma_sd_mm);

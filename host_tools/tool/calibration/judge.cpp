@@ -10,6 +10,7 @@ extern "C" {
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace fingertip::calibrating {
 namespace {
@@ -50,6 +51,12 @@ double rms(const std::vector<double> &values) {
   return values.empty() ? 0.0 : std::sqrt(sum / double(values.size()));
 }
 
+double rms_about_mean(std::vector<double> values) {
+  const double mean = std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
+  std::for_each(values.begin(), values.end(), [mean](double &value) { value -= mean; });
+  return rms(values);
+}
+
 /* Beyond what their uncertainty makes. */
 double rms_beyond(const std::vector<double> &values, const std::vector<double> &sds) {
   const double all = rms(values), chance = rms(sds);
@@ -66,14 +73,7 @@ double force_share(const Array &array, const Solution &solution) {
       forces.push_back(fitted.force);
     }
   }
-  double mean = 0.0;
-  for (double force : forces) {
-    mean += force / double(forces.size());
-  }
-  for (double &force : forces) {
-    force -= mean;
-  }
-  return rms(forces);
+  return rms_about_mean(forces);
 }
 
 /* What zeros move between the rest and the readings of a placement, rms over the sensors: by the line through the rests of all. */
@@ -218,34 +218,23 @@ Reason lacking(const Array &array, const std::vector<Placement> &placements, con
   if (placements.size() < PLACEMENTS_WANTED || !solution.solved) {
     return Reason::too_few;
   }
-  double mean_x = 0.0, mean_y = 0.0, count = 0.0;
+  std::vector<double> x_mm, y_mm;
   for (const Fitted &fitted : solution.placements) {
     if (fitted.kept) {
-      mean_x += fitted.x_mm;
-      mean_y += fitted.y_mm;
-      count += 1.0;
+      x_mm.push_back(fitted.x_mm);
+      y_mm.push_back(fitted.y_mm);
     }
   }
-  mean_x /= count;
-  mean_y /= count;
-  double squares = 0.0;
-  const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
-  const auto [bottom, top] = std::minmax_element(array.y_mm.begin(), array.y_mm.end());
-  double lowest_x = *right, highest_x = *left, lowest_y = *top, highest_y = *bottom;
-  for (const Fitted &fitted : solution.placements) {
-    if (fitted.kept) {
-      squares += std::pow(fitted.x_mm - mean_x, 2) + std::pow(fitted.y_mm - mean_y, 2);
-      lowest_x = std::min(lowest_x, fitted.x_mm);
-      highest_x = std::max(highest_x, fitted.x_mm);
-      lowest_y = std::min(lowest_y, fitted.y_mm);
-      highest_y = std::max(highest_y, fitted.y_mm);
-    }
-  }
-  if (std::sqrt(squares / count) < CLUSTER_PITCHES * array.pitch_mm) {
+  if (std::hypot(rms_about_mean(x_mm), rms_about_mean(y_mm)) < CLUSTER_PITCHES * array.pitch_mm) {
     return Reason::cluster;
   }
-  const double end_x = END_SHARE * (*right - *left), end_y = END_SHARE * (*top - *bottom);
-  if (unloaded || lowest_x > *left + end_x || highest_x < *right - end_x || lowest_y > *bottom + end_y || highest_y < *top - end_y) {
+  const auto lacks_an_end = [](const std::vector<double> &places, const std::vector<double> &sensors) {
+    const auto [least, most] = std::minmax_element(places.begin(), places.end());
+    const auto [first, last] = std::minmax_element(sensors.begin(), sensors.end());
+    const double end = END_SHARE * (*last - *first);
+    return *least > *first + end || *most < *last - end;
+  };
+  if (unloaded || lacks_an_end(x_mm, array.x_mm) || lacks_an_end(y_mm, array.y_mm)) {
     return Reason::one_end;
   }
   return placements.size() < PLACEMENTS_ENOUGH ? Reason::too_few : Reason::unsure;
@@ -440,18 +429,12 @@ Judgement judge(const Array &array, std::vector<Placement> placements, bool last
     j.slope = std::hypot(s.pull[0], s.pull[1]);
     j.drift_share = drift_Pa(placements, array.sensors()) / s.peak_Pa;
   }
-  if (placements.size() >= EVIDENCE_MIN && !j.silent.empty()) {
-    j.state = Judgement::State::refused;
-    j.reason = Reason::silent;
-    j.text = text_of(j, placements.size());
-    return j;
-  }
   last = last || placements.size() >= PLACEMENTS_MAX;
   const Evidence evidence = s.solved ? against(j) : Evidence{};
-  if (placements.size() >= EVIDENCE_MIN && evidence.times > 1.0 &&
-      (last || placements.size() >= EVIDENCE_SURE || evidence.times > EVIDENCE_CLEAR)) {
+  const bool speaks = evidence.times > 1.0 && (last || placements.size() >= EVIDENCE_SURE || evidence.times > EVIDENCE_CLEAR);
+  if (placements.size() >= EVIDENCE_MIN && (speaks || !j.silent.empty())) {
     j.state = Judgement::State::refused;
-    j.reason = evidence.reason;
+    j.reason = j.silent.empty() ? evidence.reason : Reason::silent;
     j.text = text_of(j, placements.size());
     return j;
   }

@@ -38,8 +38,8 @@ static void accumulate(const Reading &r, double weight, MatrixXd &global, Matrix
 double huber(double square) { return square <= HUBER * HUBER ? square : 2.0 * HUBER * std::sqrt(square) - HUBER * HUBER; }
 double huber_weight(double square) { return square <= HUBER * HUBER ? 1.0 : HUBER / std::sqrt(square); }
 
-Model::Model(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions)
-    : layout{static_cast<int>(array.sensors())}, array_(array), placements_(placements), assumed_(assumptions) {
+Model::Model(const Array &array, const std::vector<Placement> &placements)
+    : layout{static_cast<int>(array.sensors())}, array_(array), placements_(placements) {
   std::vector<double> peaks;
   for (const Placement &placement : placements) {
     peaks.push_back(largest_Pa(placement));
@@ -51,11 +51,7 @@ Model::Model(const Array &array, const std::vector<Placement> &placements, const
 }
 
 void Model::assume(const Spread &spread, double excess) {
-  assumed_.position_mm = spread.position_mm;
-  assumed_.force = spread.force;
-  assumed_.width = spread.width;
-  assumed_.ellipse = spread.ellipse;
-  assumed_.own_width = spread.own_width;
+  assumed_.spread = spread;
   excess_ = excess;
 }
 
@@ -169,37 +165,28 @@ double Model::expected_sd(const Placement &placement, double reading_Pa) const {
 }
 
 std::pair<double, double> Model::prior(int at) const {
-  const int n = layout.sensors;
-  if (at < n) {
-    return {0.0, assumed_.gain};
-  }
-  if (at == layout.log_peak()) {
-    return {std::log(near_Pa_), assumed_.peak};
-  }
-  if (at == layout.mixing()) {
-    return {assumed_.mixing, assumed_.mixing_sd};
-  }
-  if (at == layout.dip()) {
-    return {0.0, assumed_.dip};
-  }
-  if (at == layout.dip_width()) {
-    return {std::log(DIP_WIDTHS), assumed_.dip_log_sd};
-  }
-  if (at < layout.dx(0)) {
-    return {0.0, at < layout.ellipse(0) ? 0.0 : at < layout.pull(0) ? assumed_.ellipse_of_all : assumed_.pull};
-  }
-  if (at < layout.offset(0)) {
-    return {0.0, assumed_.position_mm};
-  }
-  if (at < layout.memory(0)) {
-    return {0.0, assumed_.offset_share * peak_Pa_};
-  }
-  return {0.0, at < layout.own_width(0) ? assumed_.memory : assumed_.own_width};
+  const struct {
+    int end;
+    double mean, sd;
+  } priors[] = {{layout.log_peak(), 0.0, assumed_.gain},
+                {layout.log_width(), std::log(near_Pa_), assumed_.peak},
+                {layout.mixing(), 0.0, 0.0},
+                {layout.ellipse(0), assumed_.mixing, assumed_.mixing_sd},
+                {layout.dip(), 0.0, assumed_.ellipse_of_all},
+                {layout.dip_width(), 0.0, assumed_.dip},
+                {layout.pull(0), std::log(DIP_WIDTHS), assumed_.dip_log_sd},
+                {layout.dx(0), 0.0, assumed_.pull},
+                {layout.offset(0), 0.0, assumed_.spread.position_mm},
+                {layout.memory(0), 0.0, assumed_.offset_share * peak_Pa_},
+                {layout.own_width(0), 0.0, assumed_.memory},
+                {layout.size(), 0.0, assumed_.spread.own_width}};
+  const auto &of = *std::find_if(std::begin(priors), std::end(priors), [at](const auto &each) { return at < each.end; });
+  return {of.mean, of.sd};
 }
 
 Local Model::local_sd() const {
   Local sd;
-  sd << 0.0, 0.0, assumed_.force, assumed_.width, assumed_.ellipse, assumed_.ellipse;
+  sd << 0.0, 0.0, assumed_.spread.force, assumed_.spread.width, assumed_.spread.ellipse, assumed_.spread.ellipse;
   return sd;
 }
 
@@ -321,8 +308,12 @@ void Optimiser::assemble() {
       const Reading r = model_.reading(at.global, at.locals[i], k, model_.earlier_Pa(i, k));
       const double per = 1.0 / model_.expected_sd(placements_[i], k);
       const double left = (placements_[i].reading_Pa[std::size_t(k)] - r.model) * per;
-      const double weight = huber_weight(left * left) * per;
-      add(i, r, weight * per, weight * left);
+      const double weight = huber_weight(left * left) * per, slope = weight * left;
+      for (const auto &[unknown, by] : r.terms) {
+        gradient_[unknown] += slope * by;
+      }
+      accumulate(r, weight * per, normal_, cross_[i], local_normal_[i]);
+      local_gradient_[i] += slope * r.by_local;
     }
     for (int j = 2; j < LOCAL; j++) {
       const double left = -at.locals[i][j] / sd[j];
@@ -331,14 +322,6 @@ void Optimiser::assemble() {
       local_gradient_[i][j] += weight * left / sd[j];
     }
   }
-}
-
-void Optimiser::add(std::size_t i, const Reading &r, double square, double slope) {
-  for (const auto &[unknown, by] : r.terms) {
-    gradient_[unknown] += slope * by;
-  }
-  accumulate(r, square, normal_, cross_[i], local_normal_[i]);
-  local_gradient_[i] += slope * r.by_local;
 }
 
 LocalSquare Optimiser::damped(std::size_t i, double damping) const {
@@ -383,7 +366,8 @@ void Optimiser::step(double damping, Unknowns &unknowns) const {
   }
 }
 
-double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions &given, const Eigen::MatrixXd &covariance) {
+double learn_spreads(Model &model, const Optimiser &optimiser, const MatrixXd &covariance) {
+  constexpr Assumptions given;
   const Layout &layout = model.layout;
   const auto &[global, locals] = optimiser.at;
   const std::vector<Placement> &placements = model.placements();
@@ -430,11 +414,11 @@ double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions
     change = std::max(change, std::abs(now / spread - 1.0));
     spread = now;
   };
-  learn(learnt.position_mm, given.position_mm, position, 2.0 * n);
-  learn(learnt.own_width, given.own_width, own_width, double(n));
-  learn(learnt.force, given.force, squares[2], count);
-  learn(learnt.width, given.width, squares[3], count);
-  learn(learnt.ellipse, given.ellipse, squares[4] + squares[5], 2.0 * count);
+  learn(learnt.position_mm, given.spread.position_mm, position, 2.0 * n);
+  learn(learnt.own_width, given.spread.own_width, own_width, double(n));
+  learn(learnt.force, given.spread.force, squares[2], count);
+  learn(learnt.width, given.spread.width, squares[3], count);
+  learn(learnt.ellipse, given.spread.ellipse, squares[4] + squares[5], 2.0 * count);
   learn(excess, 1.0, misfit * excess * excess, std::max(readings - known, 1.0));
   model.assume(learnt, excess);
   return change;

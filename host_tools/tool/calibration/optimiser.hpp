@@ -58,7 +58,7 @@ double huber_weight(double square);
 class Model {
 public:
   /* Placements and array outlive the model. */
-  Model(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions);
+  Model(const Array &array, const std::vector<Placement> &placements);
 
   /* Each placement where the readings' logarithms have their peak, in pitches. */
   Unknowns first_guess() const;
@@ -77,7 +77,7 @@ public:
 
   const std::vector<Placement> &placements() const { return placements_; }
   double excess() const { return excess_; }
-  Spread spread() const { return {assumed_.position_mm, assumed_.force, assumed_.width, assumed_.ellipse, assumed_.own_width}; }
+  Spread spread() const { return assumed_.spread; }
   /* From now on, instead of what was assumed. */
   void assume(const Spread &spread, double excess);
 
@@ -117,7 +117,6 @@ private:
   double cost(const Unknowns &unknowns) const;
   /* Normal matrix and gradient at the present point. */
   void assemble();
-  void add(std::size_t i, const Reading &r, double square, double slope);
   LocalSquare damped(std::size_t i, double damping) const;
   Eigen::MatrixXd reduced(double damping, Eigen::VectorXd *right) const;
   void step(double damping, Unknowns &unknowns) const;
@@ -134,6 +133,6 @@ private:
 
 /* Gives the model the spreads that the session shows, by expectation and maximisation, each held to what was
  * assumed. covariance: the optimiser's, at its present point. Returns the largest relative change. */
-double learn_spreads(Model &model, const Optimiser &optimiser, const Assumptions &given, const Eigen::MatrixXd &covariance);
+double learn_spreads(Model &model, const Optimiser &optimiser, const Eigen::MatrixXd &covariance);
 
 } // namespace fingertip::calibrating

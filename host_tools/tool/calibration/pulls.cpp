@@ -247,18 +247,11 @@ bool PullSession::take(const wire_packet &packet) {
   if (packet.type != WIRE_CONTACT || (contact.flags & CONTACT_FLAG_HELD)) {
     return false;
   }
-  PullFrame frame;
-  frame.t_s = 1e-6 * static_cast<double>(packet.t_us);
-  frame.contact = contact.flags & CONTACT_FLAG_CONTACT;
-  frame.good = (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) && !(contact.flags & (CONTACT_FLAG_MOVING | CONTACT_FLAG_SLIDING)) &&
-               !(contact.flags & warning_flags() & ~HARMLESS);
-  frame.qx_N = static_cast<double>(contact.qx_N);
-  frame.qy_N = static_cast<double>(contact.qy_N);
-  frame.q_sd_N = frame.good ? sd_without_scale_N(contact, pad_) : 0.0;
-  frame.force_N = static_cast<double>(contact.force_N);
-  frame.x_mm = static_cast<double>(contact.x_mm);
-  frame.y_mm = static_cast<double>(contact.y_mm);
-  const auto found = finder_.take(frame);
+  const bool good = (contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) &&
+                    !(contact.flags & (CONTACT_FLAG_MOVING | CONTACT_FLAG_SLIDING | (warning_flags() & ~HARMLESS)));
+  const auto found = finder_.take({1e-6 * double(packet.t_us), (contact.flags & CONTACT_FLAG_CONTACT) != 0, good, double(contact.qx_N),
+                                   double(contact.qy_N), good ? sd_without_scale_N(contact, pad_) : 0.0, double(contact.force_N),
+                                   double(contact.x_mm), double(contact.y_mm)});
   if (found) {
     pulls_.push_back(*found);
   }

@@ -115,13 +115,8 @@ MatrixXd gain_covariance(const MatrixXd &covariance, Eigen::Index n) {
 void resume(const Solution &solution, Model &model, Optimiser &optimiser) {
   const Layout &layout = model.layout;
   auto &[global, locals] = optimiser.at;
-  const double log_mean = [&] {
-    double sum = 0.0;
-    for (double gain : solution.gain) {
-      sum += std::log(gain);
-    }
-    return sum / layout.sensors;
-  }();
+  const auto add_log = [](double sum, double gain) { return sum + std::log(gain); };
+  const double log_mean = std::accumulate(solution.gain.begin(), solution.gain.end(), 0.0, add_log) / layout.sensors;
   for (int k = 0; k < layout.sensors; k++) {
     const auto at = std::size_t(k);
     global[k] = std::log(solution.gain[at]) - log_mean;
@@ -187,8 +182,7 @@ double median(std::vector<double> values) {
 
 namespace {
 
-Solution solve_any(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions, bool keep_all,
-                   const Solution *from) {
+Solution solve_any(const Array &array, const std::vector<Placement> &placements, bool keep_all, const Solution *from) {
   for (const Placement &placement : placements) {
     if (placement.reading_Pa.size() != array.sensors()) {
       throw std::invalid_argument("a placement has as many readings as the array has sensors");
@@ -199,7 +193,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
   if (placements.size() < PLACEMENTS_MIN) {
     return solution;
   }
-  Model model(array, placements, assumptions);
+  Model model(array, placements);
   Optimiser optimiser(model);
   const VectorXd &global = optimiser.at.global;
   const std::vector<Local> &locals = optimiser.at.locals;
@@ -262,7 +256,7 @@ Solution solve_any(const Array &array, const std::vector<Placement> &placements,
     look();
   }
   MatrixXd covariance = optimiser.covariance();
-  for (int round = 0; !from && round < LEARN_ROUNDS && learn_spreads(model, optimiser, assumptions, covariance) > LEARNT; round++) {
+  for (int round = 0; !from && round < LEARN_ROUNDS && learn_spreads(model, optimiser, covariance) > LEARNT; round++) {
     optimiser.descend(1);
     covariance = optimiser.covariance();
   }
@@ -348,15 +342,15 @@ void check_places(const Array &array) {
   }
 }
 
-Solution solve(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions, bool keep_all) {
-  return solve_any(array, placements, assumptions, keep_all, nullptr);
+Solution solve(const Array &array, const std::vector<Placement> &placements, bool keep_all) {
+  return solve_any(array, placements, keep_all, nullptr);
 }
 
-Solution solve_from(const Array &array, const std::vector<Placement> &placements, const Solution &from, const Assumptions &assumptions) {
-  return solve_any(array, placements, assumptions, true, &from);
+Solution solve_from(const Array &array, const std::vector<Placement> &placements, const Solution &from) {
+  return solve_any(array, placements, true, &from);
 }
 
-Wanted next_place(const Array &array, const std::vector<Placement> &placements, const Solution &solution, const Assumptions &assumptions) {
+Wanted next_place(const Array &array, const std::vector<Placement> &placements, const Solution &solution) {
   std::vector<double> x_mm, y_mm;
   const double step = 0.5 * array.pitch_mm;
   const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
@@ -388,7 +382,7 @@ Wanted next_place(const Array &array, const std::vector<Placement> &placements, 
     }
     return {x_mm[best], y_mm[best], std::numeric_limits<double>::infinity()};
   }
-  Model model(array, placements, assumptions);
+  Model model(array, placements);
   Optimiser optimiser(model);
   resume(solution, model, optimiser);
   const MatrixXd information = optimiser.information();

@@ -76,20 +76,25 @@ double median(std::vector<double> values);
 /* Standard gravity: the force of a weight. */
 constexpr double GRAVITY_N_PER_g = 9.80665e-3;
 
+/* Standard deviations of the priors that a session shows: as they are expected, and then as it has them. */
+struct Spread {
+  double position_mm = 0.1; /* of a sensor from its place in the layout, each way */
+  double force = 0.025;     /* of the force between placements of one weight */
+  double width = 0.01;      /* of the width between places: a pad cast a little aslant */
+  double ellipse = 0.007;   /* of q1 and q2 from placement to placement; axes differ by 2 q */
+  double own_width = 0.01;  /* of b: 0.035 to 0.07 on real pads */
+};
+
 /* What a session is expected to hold: standard deviations of the priors. */
 struct Assumptions {
+  Spread spread;
   double gain = 0.2;                    /* of the log gains: real pads spread by 12 to 22 % */
-  double position_mm = 0.1;             /* of a sensor from its place in the layout, each way */
   double offset_share = 0.0075;         /* of the peak: zeros that were off. A wide dip and such zeros look alike:
                                            with more, gains of real pads suffer; with less, sessions of the
                                            twin pass whose zeros were off (report truth, part calibration, seed 20000) */
-  double force = 0.025;                 /* of the force between placements of one weight */
-  double width = 0.01;                  /* of the width between places: a pad cast a little aslant */
-  double ellipse = 0.007;               /* of q1 and q2 from placement to placement; axes differ by 2 q */
   double ellipse_of_all = 0.03;         /* of their means: a foot is a foot, but its shape is not known */
   double pull = 0.1;                    /* of t1 and t2: the tangent of the slope */
   double memory = 0.03;                 /* of r: of a press 1 to 9 % remain after it, either sign */
-  double own_width = 0.01;              /* of b: 0.035 to 0.07 on real pads, which a session shows */
   double model_share = 0.002;           /* of the peak: what the profile leaves (above, and 0.13 % rms) */
   double reading_share = 0.003;         /* of a reading: what rubber does between 0.5 and 1 s */
   double mixing = 0.2, mixing_sd = 0.1; /* of m: 0.05 to 0.23 on the twin's tables */
@@ -126,11 +131,6 @@ struct Fitted { /* one placement */
   double ellipse[2] = {0.0, 0.0}; /* q1, q2, beside those of all */
   double residual_share = 0.0;    /* rms over its sensors, of the peak */
   double misfit = 0.0;            /* rms of residuals over their sd; large: does not belong */
-};
-
-/* What the session shows of the Assumptions of the same names; every sd is by these. */
-struct Spread {
-  double position_mm = 0.0, force = 0.0, width = 0.0, ellipse = 0.0, own_width = 0.0;
 };
 
 struct Solution {
@@ -170,12 +170,11 @@ constexpr std::size_t PLACEMENTS_MIN = 3;
 
 /* Throws std::invalid_argument if a placement has another number of readings than the array has
  * sensors. keep_all: drop none, to compare with another solver. */
-Solution solve(const Array &array, const std::vector<Placement> &placements, const Assumptions &assumptions = {}, bool keep_all = false);
+Solution solve(const Array &array, const std::vector<Placement> &placements, bool keep_all = false);
 
 /* The solution of some placements of a session, with the spreads of all of it, beginning where
  * all of it ended; from.placements are theirs. A few placements alone may have a second optimum. */
-Solution solve_from(const Array &array, const std::vector<Placement> &placements, const Solution &from,
-                    const Assumptions &assumptions = {});
+Solution solve_from(const Array &array, const std::vector<Placement> &placements, const Solution &from);
 
 /* The log gains with their mean, tilt and bowl taken out. */
 std::vector<double> outside_gauge(const Array &array, const std::vector<double> &gain);
@@ -190,7 +189,6 @@ struct Wanted {
   double x_mm, y_mm;
   double worst_shape_sd; /* then */
 };
-Wanted next_place(const Array &array, const std::vector<Placement> &placements, const Solution &solution,
-                  const Assumptions &assumptions = {});
+Wanted next_place(const Array &array, const std::vector<Placement> &placements, const Solution &solution);
 
 } // namespace fingertip::calibrating

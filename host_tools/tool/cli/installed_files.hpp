@@ -24,4 +24,7 @@ std::string page_note(const std::string &tool_version);
  * where there is no such program, else what the system reports. */
 [[noreturn]] void become(const std::string &program, const std::vector<std::string> &arguments, const std::string &missing = "");
 
+/* A command of the Python package, which finds by this program what else is installed, takes this one's place. Throws Error. */
+[[noreturn]] void run_in_package(const std::string &name, std::vector<std::string> options);
+
 } // namespace fingertip

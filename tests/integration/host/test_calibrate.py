@@ -312,15 +312,8 @@ class Drags(CalibrateTest):
         with self.device(f"play={pulled}", GRASP, "pad=1"):
             out, err = self.drag("--port", self.port, "--yes")
             self.assertEqual(err, "")
-            for advice in (
-                "set the object down, its string slack\n",
-                "release it, and leave it alone\n",
-                "pull: hang the weight on its string\n",
-                "hold on\n",
-                "taken: take it off the pad\n",
-                "; 7 of 8 pulls\n",
-            ):
-                self.assertIn(advice, out)
+            self.assertRegex(out, r"^set the object down, its string slack\nrelease it, and .*\npull: hang the weight on its string\n")
+            self.assertRegex(out, r"(?s)\nhold on\n.*\ntaken: take it off the pad\n.*; 7 of 8 pulls\n")
             self.assertNotIn("\x1b", out)
             self.assertIn("the force's scale is not calibrated, of which this is a multiple: once it is, do this again\n", out)
             self.assertTrue(out.endswith("calibrated: it applies from now on\n"), out)
@@ -353,10 +346,8 @@ class Usage(CalibrateTest):
             (("--dry-run",), "--dry-run goes with --from"),
             (("--weight", "x"), "10.2 to 5099"),
             (("--force", "0"), "0.1 to 50"),
-            (("--force", "3", "--weight", "300"), "excludes"),
             (("--show", "--erase"), "excludes"),
             (("--drag",), "--drag needs the pull"),
-            (("--drag", "--show"), "excludes"),
         ):
             self.assertIn(reason, self.error("calibrate", *arguments, status=2))
         self.assertIn("absent.csv", self.error("calibrate", "--from", os.path.join(self.folder, "absent.csv"), "--dry-run"))

@@ -7,6 +7,7 @@ import csv
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -19,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python")]
 import fingertip  # noqa: E402
 from fingertip.fit import SHAPES, firmware, read_pad  # noqa: E402
-from fingertip.line import WARNINGS, Flag  # noqa: E402
+from fingertip.line import CONTACT_COLUMNS, RAW_COLUMNS, WARNINGS, Flag  # noqa: E402
 
 PAD = read_pad("2x4")
 RUBBER = {"thickness_mm": 12}
@@ -130,6 +131,40 @@ class Fit(unittest.TestCase):
         self.assertAlmostEqual(np.median(after["force_N"]), 2.0, delta=0.1)
         self.assertLess((after["flags"] & WARNINGS > 0).mean(), 0.5 * (before["flags"] & WARNINGS > 0).mean())
 
+    def test_a_weight_set_down_again_and_again_in_time_calibrates_and_a_recording_is_read_as_it_is(self):
+        gains, t_s = np.exp(0.15 * np.random.default_rng(3).normal(size=8)), np.arange(0, 160, 1 / 40)
+        x_mm, y_mm, _ = presses(PAD, 40, 3.6, seed=4)
+        place, down = (t_s // 4).astype(int), np.clip(10 * (t_s % 4 - 1.5), 0, 1) * np.clip(10 * (3.9 - t_s % 4), 0, 1)
+        noise_Pa = 5.0 * np.random.default_rng(6).normal(size=(len(t_s), 8))
+        series_Pa = 12000.0 * gains * down[:, None] * responses(PAD, x_mm[place], y_mm[place], 3.6) + noise_Pa
+        known = fingertip.calibrate(series_Pa + 101e3, "2x4", time_s=t_s, zero_rows=40, force_N=2.0)
+        np.testing.assert_allclose(known["gain"] / np.mean(known["gain"]), gains / gains.mean(), atol=0.02)
+        self.assertGreater(known["force_scale"], 0.0)
+        for rows, slower, words in ((500, 1, "from 3 placements: too few"), (None, 4, "10 rows a second, and 12 show a weight settle")):
+            self.assertRaisesRegex(fingertip.InputError, words, fingertip.calibrate, series_Pa[:rows], "2x4", time_s=slower * t_s[:rows])
+
+        names = ["t_us", "frame", *CONTACT_COLUMNS, *RAW_COLUMNS, *(f"{kind}{k}_Pa" for kind in ("s", "tare") for k in range(8))]
+        x_mm, y_mm = (" ".join(map(str, places)) for places in (PAD.x_mm, PAD.y_mm))
+        head = f"# fingertip-recording 1\n# serial: A\n# sensors: 8\n# pitch_mm: {PAD.pitch_mm}\n# x_mm: {x_mm}\n# y_mm: {y_mm}\n"
+        empty, doubtful = "," * len(CONTACT_COLUMNS), np.where(np.arange(len(t_s)) == 1000, 8, 0)
+        readings = [",".join(f"{101e3 + value:.3f}" for value in row) + ",101000" * 8 for row in series_Pa]
+        rows = [f"{25000 * i},{i}{empty},{i},0,255,0,{doubtful[i]},25,{row}\n" for i, row in enumerate(readings)]
+        with tempfile.TemporaryDirectory() as folder:
+            recording, kept = pathlib.Path(folder, "r.csv"), pathlib.Path(folder, "kept.json")
+            recording.write_text(head + ",".join(names) + "\n" + "".join(rows))
+            out = []
+            for options in ("calibrate --dry-run --from", f"calibrate --pad 2x4 -o {kept} --from", f"fit --calibration {kept}"):
+                done = subprocess.run([FINGERTIP, *options.split(), recording], capture_output=True, text=True)
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+                out.append(done.stdout)
+            of_tool = [float(gain) for gain in re.findall(r"^ +\d +(\d\.\d{3}) ", out[0], re.M)]
+            np.testing.assert_allclose(json.loads(kept.read_text())["gain"], of_tool, atol=2e-3)
+        found = list(csv.DictReader(out[2].splitlines()))
+        wanted = fingertip.fit(series_Pa, "2x4", time_s=t_s, calibration={"gain": of_tool})
+        self.assertEqual([row["t_s"] for row in found[:2]], ["0.0", "0.025"])
+        np.testing.assert_array_equal([row["x_mm"] != "" for row in found], np.isfinite(wanted["x_mm"]))
+        self.assertEqual([int(row["flags"]) & Flag.SENSOR_MASKED for row in found], np.where(doubtful, int(Flag.SENSOR_MASKED), 0).tolist())
+
     def test_what_cannot_be_is_refused_with_its_cause(self):
         readings_Pa = presses(PAD, 10, 4.5)[2]
         t_s, rest_Pa = 0.01 * np.arange(20), 5.0 * np.random.default_rng(1).normal(size=(10, 8))
@@ -144,7 +179,6 @@ class Fit(unittest.TestCase):
             (readings_Pa, "2x4", {"calibration": {"gain": [1.0] * 7}}, "gain has 7 values"),
             (readings_Pa, "2x4", {"calibration": {"gains": []}}, "has none of sigma_mm"),
             (readings_Pa, "2x4", {"calibration": {"force_scale": 1.0}}, "without its standard deviation"),
-            (readings_Pa, "2x4", {"calibration": "/"}, "/: Is a directory"),
             (readings_Pa, "2x4", {"calibration": __file__}, "test_fit.py: no JSON"),
             (readings_Pa[:, :7], "2x4", {}, "10 x 7, and pad 2x4 has 8 sensors"),
             (readings_Pa, "2x5", {}, "no such pad; give 2x4, 3x5, 4x4"),
@@ -179,8 +213,8 @@ class Fit(unittest.TestCase):
             lines = [f"{x},{y},{','.join(map(repr, row.tolist()))}" for x, y, row in zip(x_mm, y_mm, readings_Pa / 1000)]
             pathlib.Path(path).write_text("x,y,some pressures\n" + "\n".join(lines) + "\n")
 
-            def run(*options, status=0):
-                done = subprocess.run([FINGERTIP, "fit", path, *options], capture_output=True, text=True)
+            def run(*options, status=0, command=("fit",)):
+                done = subprocess.run([FINGERTIP, *command, path, *options], capture_output=True, text=True)
                 self.assertEqual(done.returncode, status, done.stderr)
                 return done.stdout + done.stderr
 
@@ -190,13 +224,23 @@ class Fit(unittest.TestCase):
             np.testing.assert_allclose([float(row["x_mm"]) for row in rows], found["x_mm"], atol=1e-5)
             self.assertIn("10 columns, and the pad has 8 sensors", run("--pad", "2x4", status=1))
             run(*right, "-o", out)
+            weight_Pa = np.exp(0.15 * np.random.default_rng(3).normal(size=8)) * presses(PAD, 40, 3.6, seed=4)[2]
+            np.savetxt(f"{folder}/weight.csv", np.c_[np.zeros((40, 2)), weight_Pa / 1000], delimiter=",")
+            of_weight = ("calibrate", "--weight", "200", *right, "-o", f"{folder}/gains.json", "--from", f"{folder}/weight.csv")
+            self.assertEqual(subprocess.run([FINGERTIP, *of_weight], capture_output=True, text=True).stderr, "")
+            written = json.loads(pathlib.Path(f"{folder}/gains.json").read_text())
+            for name, known in fingertip.calibrate(weight_Pa, "2x4", force_N=1.96133).items():
+                np.testing.assert_allclose(written[name], known, rtol=1e-4)
+            run(*right, "--calibration", f"{folder}/gains.json")
+            self.assertIn("or `calibrate --from` with --pad", run(command=("calibrate", "--from"), status=1))
+            self.assertIn('"--first" is no option of it', run("--first", "3", command=("calibrate", "--from"), status=2))
+            self.assertIn("--pad NAME, or FILE.json, is needed", run(status=2))
             for options, words in (
                 ((*right, "-o", out), "--overwrite"),
                 ((*right, "-o", path, "--overwrite"), "presses.csv: is named twice"),
                 ((*right, "-o", out, "--calibration", out, "--overwrite"), "out.csv: is named twice"),
                 (("--pad", "none", "-o", folder), "is a folder"),
                 (("--pad", "none", "-o", f"{folder}/no/out.csv"), "there is no folder"),
-                (("--pad", "none", "-o", ""), "is a folder"),
                 ((*right, "--calibrate", "--weight", "nan"), "a weight of nan N is out of range"),
                 ((*right, "--calibrate"), "the pad's width and dip do: the sensors are alike, or something changed"),
             ):

@@ -41,6 +41,15 @@ static KnownPad::Press lying(Random &random, double axes) {
   return press;
 }
 
+/* Anywhere, with this of it in even and in odd placements. */
+static std::function<KnownPad::Press(Random &, int)> with(double KnownPad::Press::*what, double even, double odd) {
+  return [=](Random &random, int i) {
+    KnownPad::Press press = anywhere(random);
+    press.*what = i % 2 ? odd : even;
+    return press;
+  };
+}
+
 static void alternate(Placement &placement, double off_Pa) {
   for (std::size_t k = 0; k < 15; k++) {
     placement.reading_Pa[k] += k % 2 ? off_Pa : -off_Pa;
@@ -142,12 +151,7 @@ TEST(Judge, refuses_with_the_reason) {
     std::size_t count = 30;
   } cases[] = {
       {Reason::elongated, "round", 62, [](Random &random, int) { return lying(random, 1.25); }},
-      {Reason::elongated, "round", 63,
-       [](Random &random, int) {
-         KnownPad::Press press = anywhere(random);
-         press.axes = 1.25;
-         return press;
-       }},
+      {Reason::elongated, "round", 63, with(&KnownPad::Press::axes, 1.25, 1.25)},
       {Reason::offsets, "tare", 64, anywhere, [](Placement &placement, int) { alternate(placement, 500.0); }},
       {Reason::drift, "warm up", 65, anywhere,
        [](Placement &placement, int) {
@@ -155,18 +159,8 @@ TEST(Judge, refuses_with_the_reason) {
            placement.rest_Pa.push_back(1e5 + (k % 2 ? 100.0 : -100.0) * placement.t_s);
          }
        }},
-      {Reason::slope, "level the pad", 75,
-       [](Random &random, int) {
-         KnownPad::Press press = anywhere(random);
-         press.slope = 0.5;
-         return press;
-       }},
-      {Reason::weights, "same weight", 66,
-       [](Random &random, int i) {
-         KnownPad::Press press = anywhere(random);
-         press.force = i % 2 ? 1.0 : 1.3;
-         return press;
-       }},
+      {Reason::slope, "level the pad", 75, with(&KnownPad::Press::slope, 0.5, 0.5)},
+      {Reason::weights, "same weight", 66, with(&KnownPad::Press::force, 1.3, 1.0)},
       {Reason::one_end, "part of the pad", 67, [](Random &random, int) { return within(random, 9.0, 6.0, 18.0); }},
       {Reason::cluster, "near one place", 68, [](Random &random, int) { return within(random, 5.0, -5.0, 5.0); }},
       {Reason::too_few, "(7)", 69, anywhere, {}, 7},

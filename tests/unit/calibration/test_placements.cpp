@@ -39,8 +39,9 @@ struct Feed {
   void rest(double seconds) {
     run(seconds, [](double) { return 0.0; });
   }
-  void stand(double seconds, double force = 1.0) {
-    run(seconds, [=](double) { return force; });
+  void stand(double seconds, double force = 1.0, const std::function<std::pair<double, double>(double)> &place = {}) {
+    run(
+        seconds, [=](double) { return force; }, place);
   }
   void press(double force = 1.0) {
     run(0.3, [=](double t) { return force * t / 0.3; });
@@ -152,17 +153,9 @@ TEST(Placements, a_hand_is_none) {
     feed->rest(1.0);
     feed->press();
   }
-  sways.run(
-      8.0, [](double) { return 1.0; },
-      [](double t) {
-        return std::pair{2.0 + 0.4 * std::sin(9.0 * t), 3.0 + 0.3 * std::sin(7.0 * t)};
-      });
+  sways.stand(8.0, 1.0, [](double t) { return std::make_pair(2.0 + 0.4 * std::sin(9.0 * t), 3.0 + 0.3 * std::sin(7.0 * t)); });
   trembles.run(8.0, [](double t) { return 1.0 + 0.03 * std::sin(20.0 * t) + 0.03 * std::sin(13.0 * t); });
-  slides.run(
-      8.0, [](double) { return 1.0; },
-      [](double t) {
-        return std::pair{2.0 - 0.8 * t, 3.0};
-      });
+  slides.stand(8.0, 1.0, [](double t) { return std::make_pair(2.0 - 0.8 * t, 3.0); });
   grows.run(8.0, [](double t) { return std::exp(0.25 * t); });
   for (Feed *feed : {&sways, &trembles, &slides, &grows}) {
     EXPECT_TRUE(feed->found.empty());

@@ -42,18 +42,9 @@ public:
 
 private:
   void frame(bool contact) {
-    PullFrame frame;
     t_s_ += 1.0 / RATE_Hz;
-    frame.t_s = t_s_;
-    frame.contact = contact;
-    frame.good = good && contact;
-    frame.qx_N = qx_N_ + zero_x_N + noise_N * normal_(random_);
-    frame.qy_N = qy_N_ + zero_y_N + noise_N * normal_(random_);
-    frame.q_sd_N = sd_N;
-    frame.force_N = force_N_;
-    frame.x_mm = x_mm;
-    frame.y_mm = y_mm;
-    if (const auto found = finder_.take(frame)) {
+    const double qx_N = qx_N_ + zero_x_N + noise_N * normal_(random_), qy_N = qy_N_ + zero_y_N + noise_N * normal_(random_);
+    if (const auto found = finder_.take({t_s_, contact, good && contact, qx_N, qy_N, sd_N, force_N_, x_mm, y_mm})) {
       pulls_.push_back(*found);
     }
   }
@@ -70,10 +61,7 @@ static std::vector<Pull> pulls_that_read(std::size_t count, double (*reading)(st
   std::vector<Pull> pulls;
   for (std::size_t i = 0; i < count; i++) {
     const double angle_rad = M_PI_2 * static_cast<double>(i % 4), size_N = reading(i) * KNOWN_N;
-    Pull pull;
-    pull.qx_N = size_N * std::cos(angle_rad);
-    pull.qy_N = size_N * std::sin(angle_rad);
-    pulls.push_back(pull);
+    pulls.push_back({0.0, size_N * std::cos(angle_rad), size_N * std::sin(angle_rad)});
   }
   return pulls;
 }
@@ -148,13 +136,7 @@ TEST(PullFinder, FramesThatAreMissingMakeNoMean) {
   for (double step_s : {0.3, 0.7, 2.0}) {
     PullFinder finder(KNOWN_N);
     for (int i = 1; i < 40; i++) {
-      PullFrame frame;
-      frame.t_s = step_s * i;
-      frame.contact = frame.good = true;
-      frame.qx_N = i > 20 ? KNOWN_N : 0.0;
-      frame.q_sd_N = 0.06;
-      frame.force_N = FORCE_N;
-      EXPECT_FALSE(finder.take(frame)) << step_s << " " << i;
+      EXPECT_FALSE(finder.take({step_s * i, true, true, i > 20 ? KNOWN_N : 0.0, 0.0, 0.06, FORCE_N})) << step_s << " " << i;
     }
     EXPECT_EQ(finder.state(), PullFinder::State::settling);
   }

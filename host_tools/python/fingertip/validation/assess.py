@@ -15,13 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import table_of
 from ..errors import InputError
-from ..fit import firmware
 from ..line import Capability, Stored
 from .marks_fit import LOOSE_SCATTER, MARKS_MIN, RESPONDS_SHARE, fit_marks
 from .measure import AFTER_s
-from .placements import bits_of
+from .placements import solve_gains
 from .protocol import GRAVITY_N_PER_g
 from .pulls import upper_median
 
@@ -85,19 +83,6 @@ def _named(sensors):
     return f"Sensor {names[0]}" if len(names) == 1 else f"Sensors {', '.join(names[:-1])} and {names[-1]}"
 
 
-def solve_gains(array, placements, force_N):
-    """(solved_placements of host_tools/tool/arrays/placements.cpp, [gain, sd] by sensor): there is one solver of a calibration. Raises InputError."""
-    library = firmware()
-    found, solved = library.made("found_placement", len(placements)), library.made("solved_placements", 1)
-    for name in ("t_s", "noise_Pa", "fading"):
-        found[name] = [getattr(one, name) for one in placements]
-    found["usable"] = [bits_of(one.usable) for one in placements]
-    levels = table_of([(one.reading_Pa, one.rest_Pa) for one in placements] or np.zeros((0, 2, array.sensors)))
-    gains = np.zeros((2, array.sensors))
-    library.call("solve_placements", array.x_mm, array.y_mm, array.pitch_mm, force_N, found, levels, solved, gains)
-    return solved[0], gains
-
-
 def why_no_tangential(pad):
     """Why this fingertip estimates no tangential force, and what to do; empty: it does."""
     if not pad.capabilities & Capability.TANGENTIAL:
@@ -114,7 +99,7 @@ def why_no_tangential(pad):
 
 
 class Card:
-    """measured (measure.py), fit (marks_fit.py), solution (of a calibration from these presses), gain and gain_sd by sensor (0: none),
+    """measured (measure.py), fit (marks_fit.py), solution and judged (a calibration from these presses), gain and gain_sd by sensor (0: none),
     location_mm by press (the estimate's error each way; None: no estimate), figures, pull_note, findings, cautions."""
 
     def __init__(self, measured, name):
@@ -278,9 +263,9 @@ class Card:
                     to = self.place[k]
                     usable[to], reading_Pa[to], rest_Pa[to] = True, at.reading_Pa[k], at.rest_Pa[k]
             placements.append(at._replace(usable=usable, reading_Pa=reading_Pa, rest_Pa=rest_Pa))
-        self.solution, gains = solve_gains(self.array, placements, self.weight_N)
+        self.solution, gains, self.judged, _ = solve_gains(self.array, placements, self.weight_N)
         self.gain, self.gain_sd = np.zeros(self.sensors), np.zeros(self.sensors)
-        if not self.solution["solved"]:
+        if not self.judged["solved"]:
             return
         known = np.flatnonzero(~self._dead & ~self._loose)
         self.gain[known], self.gain_sd[known] = gains[:, self.place[known]]
@@ -337,7 +322,7 @@ class Card:
 
     def _find_thickness(self):
         found = self.solution
-        if not found["solved"]:
+        if not self.judged["solved"]:
             return False
         self._add("sigma_mm", "width of the response, sigma", "mm", found["sigma_mm"], 2)
         self._add("dip_percent", "dip around it, of the peak", "%", 100 * found["dip_share"], 1)

@@ -243,5 +243,5 @@ def card_json(card):
         "pulls": pulls,
         "pull_note": card.pull_note,
         "calibrated": card.is_calibrated,
-        "calibration": card.solution["judgement"].decode(),
+        "calibration": card.judged["text"].decode(),
     }

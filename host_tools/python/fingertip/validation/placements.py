@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import table_of
+from ..errors import InputError
 from ..fit import firmware
 
 FRAME_RATE_MIN_Hz = 12.0
@@ -60,3 +61,28 @@ class PlacementFinder:
         t_s, noise_Pa, fading, usable = self._found[0].item()
         reading_Pa, rest_Pa = self._levels.copy()
         return Placement(t_s, reading_Pa, usable >> np.arange(len(rest_Pa)) & 1 != 0, rest_Pa, noise_Pa, fading)
+
+
+def placements_of(t_s, reading_Pa):
+    """All of readings above their zero [row, sensor], NaN where a sensor has none. Raises InputError where they are too rare."""
+    rate_Hz = 1 / np.median(np.diff(t_s)) if len(t_s) > 1 else 0.0
+    if rate_Hz < FRAME_RATE_MIN_Hz:
+        raise InputError(f"{rate_Hz:.3g} rows a second, and {FRAME_RATE_MIN_Hz:g} show a weight settle; without a time rows are placements")
+    finder, zero_Pa, valid = PlacementFinder(reading_Pa.shape[1]), np.zeros(reading_Pa.shape[1]), np.isfinite(reading_Pa)
+    readings = zip(t_s.tolist(), valid, valid, np.nan_to_num(reading_Pa))
+    return [found for found in (finder.take(Reading(*each, zero_Pa)) for each in readings) if found]
+
+
+def solve_gains(array, placements, force_N):
+    """(solved_placements of host_tools/tool/arrays/placements.cpp, [gain, sd] by sensor, and what the tool would keep: calibration, calibrated_sensor
+    [sensor]): there is one solver of a calibration. Raises InputError."""
+    library, sensors = firmware(), len(array.x_mm)
+    counts = {"found_placement": len(placements), "solved_placements": 1, "calibration": 1, "calibrated_sensor": sensors}
+    found, solved, kept, kept_sensors = map(library.made, counts, counts.values())
+    for name in ("t_s", "noise_Pa", "fading"):
+        found[name] = [getattr(one, name) for one in placements]
+    found["usable"] = [bits_of(one.usable) for one in placements]
+    levels = table_of([(one.reading_Pa, one.rest_Pa) for one in placements] or np.zeros((0, 2, sensors)))
+    gains = np.zeros((2, sensors))
+    library.call("solve_placements", array.x_mm, array.y_mm, array.pitch_mm, force_N, found, levels, solved, gains, kept, kept_sensors)
+    return solved[0], gains, kept[0], kept_sensors

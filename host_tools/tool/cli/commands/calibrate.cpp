@@ -13,6 +13,7 @@
 #include "tool/cli/calibrate_view.hpp"
 #include "tool/cli/canvas.hpp"
 #include "tool/cli/command_line.hpp"
+#include "tool/cli/installed_files.hpp"
 #include "tool/cli/names_of_values.hpp"
 
 #include <algorithm>
@@ -47,6 +48,7 @@ struct CalibrateOptions {
   std::optional<double> force_N; /* of the weight, where it is known; pulls must have it */
   bool drag = false;             /* pulls along the rubber instead of placements */
   std::string from;              /* a recording; empty: live */
+  std::string pad;               /* of what measured the columns of a table; empty: a recording */
   bool dry_run = false;          /* of a recording, write nothing */
   bool yes = false;              /* ask nothing */
   bool show = false, erase = false;
@@ -410,6 +412,15 @@ int run_calibrate(const CalibrateOptions &options) {
   return 0;
 }
 
+/* Of pressures in the columns of a table. more: options of fingertip fit. */
+[[noreturn]] void calibrate_pad(const CalibrateOptions &options, std::vector<std::string> more) {
+  more.insert(more.begin(), {options.from, "--pad", options.pad, "--calibrate", "--device", options.choice.device});
+  if (options.force_N) {
+    more.insert(more.end(), {"--weight", std::to_string(*options.force_N / calibrating::GRAVITY_N_PER_g)});
+  }
+  run_in_package("fit", std::move(more));
+}
+
 CLI::Option *with_weight(CLI::App *command, const std::string &option, double unit_N, std::optional<double> &force_N,
                          const std::string &help) {
   const double lightest = 0.1 / unit_N, heaviest = 50 / unit_N;
@@ -431,7 +442,13 @@ void add_calibrate(CommandLine &line) {
     }
     return run_calibrate(*options);
   });
-  command->footer("Example: fingertip calibrate --weight 200");
+  command->parse_complete_callback([options, command] {
+    if (!options->pad.empty()) {
+      calibrate_pad(*options, command->remaining());
+    }
+  });
+  command->footer("Examples: fingertip calibrate --weight 200\n"
+                  "          fingertip calibrate --from theirs.csv --pad 2x4 -o gains.json");
   with_port(command, options->choice);
   CLI::Option *weight =
       with_weight(command, "--weight", calibrating::GRAVITY_N_PER_g, options->force_N, "Mass of the weight: then forces are calibrated too")
@@ -444,6 +461,11 @@ void add_calibrate(CommandLine &line) {
       with_value(command, "FILE.csv", "--from", options->from, "Use the placements of a recording with pressures, not live ones");
   CLI::Option *dry_run = command->add_flag("--dry-run", options->dry_run, "With --from: only show");
   CLI::Option *yes = command->add_flag("--yes", options->yes, "Write, or erase, without asking");
+  with_value(command, "NAME|FILE.json", "--pad", options->pad,
+             "With --from: its columns are pressures of this array. Takes the other options of fingertip fit, and writes what its "
+             "--calibration takes")
+      ->needs(from)
+      ->excludes(drag, dry_run, yes);
   CLI::Option *show =
       command->add_flag("--show", options->show, "Show the fingertip's calibration")->excludes(weight, force, drag, from, dry_run, yes);
   command->add_flag("--erase", options->erase, "Erase its calibration, after a question")

@@ -20,8 +20,7 @@ static int simulate(Words options) {
   become(program->string(), options);
 }
 
-/* A command of the Python package, which asks this program for the gains and finds by it what else is installed. */
-static int run_in_package(const std::string &name, Words options) {
+void run_in_package(const std::string &name, Words options) {
   const auto package = find_installed({"../share/fingertip/python", "python"});
   if (!package) {
     throw Error("the Python package is not installed; install all of the tool, or build the target fingertip in the "
@@ -31,8 +30,8 @@ static int run_in_package(const std::string &name, Words options) {
   options.insert(options.begin(), {package->string(), name});
   become("python3", options, name + " needs Python: sudo apt install python3 python3-numpy python3-serial");
 }
-static int validate(Words options) { return run_in_package("validate", std::move(options)); }
-static int fit(Words options) { return run_in_package("fit", std::move(options)); }
+static int validate(Words options) { run_in_package("validate", std::move(options)); }
+static int fit(Words options) { run_in_package("fit", std::move(options)); }
 
 static void add_program(CommandLine &line, const std::string &name, const std::string &help, int (*run)(Words)) {
   auto command = std::make_shared<CLI::App *>();
