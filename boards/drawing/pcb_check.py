@@ -45,8 +45,7 @@ def parsed(text):
     return nodes[0]
 
 
-def numbers(node, name):
-    return [float(word) for word in node[name][0][""]]
+numbers = lambda node, name: [float(word) for word in node[name][0][""]]
 
 
 class Board:
@@ -88,7 +87,7 @@ class Board:
             place, size = turned(*numbers(pad, "at")), numbers(pad, "size")[:: -1 if turns % 2 else 1]
             number, kind, _ = pad[""]
             if kind == "np_thru_hole":
-                self.holes.append((*place, size[0]))
+                self.holes.append((*place, *numbers(pad, "drill")))
             else:
                 again = "+" * ((name, number) in self.pads)
                 self.pads[name, number + again] = (*place, *size, pad["net"][0][""][1] if pad["net"] else None)
@@ -199,6 +198,11 @@ def wrong(text, bom, descriptor, pad):
     board = Board(text)
     slow = [(net, ns) for net, ns in rises_ns(descriptor, board).items() if ns > descriptor["rise_ns"][net[:3].lower()]]
     errors = [f"{net} rises in {ns:.0f} ns, more than its rise_ns" for net, ns in slow]
+    errors += ["a pad has no mask or paste"] * bool(re.search(r'smd rect (?!.*"([FB]).Cu" "\1.Paste" "\1.Mask"\))', text))
+    errors += ["masks are not 0.05 mm wider than pads"] * ("(pad_to_mask_clearance 0.05)" not in text)
+    zones = collections.Counter(re.findall(r'\(zone \(net \d+\) \(net_name "(\w*)"\) \(layers ([^)]*)\)', text))
+    free = {("", '"B.Cu"'): 4 * len(board.picos), ("", '"F.Cu" "B.Cu"'): len(mould.measures(pad).screws), ("GND", '"F.Cu" "B.Cu"'): 1}
+    errors += [f"zones are {zones}, not {free}"] * (zones != collections.Counter(free))
     errors += ["print is not 1 mm high in lines of 0.15 mm"] * bool(re.search(r"SilkS.*\(font .(?!size 1 1. .thickness 0.15\))", text))
     errors += [f"{name} is {part[-1]}, not {pad.part}" for name, part in board.parts.items() if name[0] == "U" and part[-1] != pad.part]
     return errors + wrong_nets(descriptor, board) + wrong_places(board, pad) + wrong_orders(board, bom)

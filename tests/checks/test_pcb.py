@@ -23,23 +23,10 @@ except ImportError:
     fabricate = None
 
 PART = r'  \(footprint "[^"]*" \(layer "[FB].Cu"\) \(at [^)]*\) \(attr [^)]*\)\n    \(fp_text reference "%s".*?\n  \)\n'
-
-
-def part(name, change):
-    """Changes one part's text."""
-    return lambda text: re.sub(PART % name, lambda found: change(found[0]), text, flags=re.DOTALL)
-
-
-def exchanged(a, b):
-    return lambda text: text.replace(f'"{a}"', '"@"').replace(f'"{b}"', f'"{a}"').replace('"@"', f'"{b}"')
-
-
-def replaced(old, new, count=1):
-    return lambda text: re.sub(old, new, text, count=count)
-
-
-def added(line):
-    return lambda text: text.rstrip()[:-1] + f"  {line}\n)\n"
+part = lambda name, change: lambda text: re.sub(PART % name, lambda found: change(found[0]), text, flags=re.DOTALL)
+exchanged = lambda a, b: lambda text: text.replace(f'"{a}"', '"@"').replace(f'"{b}"', f'"{a}"').replace('"@"', f'"{b}"')
+replaced = lambda old, new, count=1: lambda text: re.sub(old, new, text, count=count)
+added = lambda line: lambda text: text.rstrip()[:-1] + f"  {line}\n)\n"
 
 
 def described(section, **others):
@@ -69,6 +56,13 @@ PLANTS = {
         "two tracks on each other": replaced(r"(  \(segment .*\n)", r"\1\1"),
         "a via at the corner of a sensor": added(VIA % 0.3),
         "a hole elsewhere": part("H1", replaced("at 74 100", "at 74.01 100")),
+        "a smaller drill": part("H1", replaced(r"\(drill 3.2\)", "(drill 3)")),
+        "a pad of the Pico under the mask": part("A0", replaced(r'(pad "5" .*) "B.Mask"', r"\1")),
+        "a mask far from its pads": replaced("pad_to_mask_clearance 0.05", "pad_to_mask_clearance 0.3"),
+        "the pour on one side": replaced(r'(net_name "GND"\) \(layers) "F.Cu"', r"\1"),
+        "a pour of 3V3": replaced(r'\(zone \(net 2\) \(net_name "GND"', '(zone (net 1) (net_name "3V3"'),
+        "copper under a test point of the Pico": replaced(r'  \(zone \(net 0\) \(net_name ""\) \(layers "B.Cu"\).*\n', ""),
+        "copper under a screw": replaced(r'  \(zone \(net 0\) \(net_name ""\) \(layers "F.Cu" "B.Cu"\).*\n', ""),
         "another outline": replaced(r"\(end 129 138\)", "(end 129 137.99)"),
     },
     ("pico_mux", "text"): {
