@@ -164,7 +164,7 @@ static int32_t taken_into_zeros(const struct condition *condition, sensor_map us
 static void begin_contact(struct condition *condition, const struct conditioned *conditioned, uint8_t count) {
   for (uint8_t k = 0; k < count; k++) {
     update_compare(condition, k, clamped_difference(conditioned->pressure_Pa_q10[k], condition->faded_Pa_q10[k]));
-    condition->sensor[k].reached_Pa_q10 = condition->sensor[k].let_go_Pa_q10 = 0;
+    condition->sensor[k].reached_Pa_q10 = 0;
     condition->margin_Pa_q10[k] = 0;
   }
   /* What the zeros took of this contact itself, while it was within the band, counts twice: where it then moves they are off as before. */
@@ -176,8 +176,8 @@ static void begin_contact(struct condition *condition, const struct conditioned 
   condition->calm.snapshots = 0;
 }
 
-static void end_contact(struct condition *condition, uint8_t count) {
-  update_past_shows(condition, count);
+static void end_contact(struct condition *condition) {
+  condition->to_learn = ~(sensor_map)0;
   condition->drifted_Pa_q10 = larger(condition->drifted_Pa_q10, update_drift_in(condition->gate.pressed_ms));
 }
 
@@ -290,7 +290,7 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
   if (changes && pressed) {
     begin_contact(condition, conditioned, count);
   } else if (changes) {
-    end_contact(condition, count);
+    end_contact(condition);
   }
   if (!pressed) {
     sum_up(condition, frame, conditioned->usable);

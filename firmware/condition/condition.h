@@ -27,13 +27,11 @@
  * - A long contact leaves a drift too, as far as a barometer may have drifted in it.
  *
  * Past: what rubber keeps shows at rest, and goes on for 1 to 4 s in the next contact.
- * - So what the zero is off at a touch from where it comes to rest fades in the contact, with PAST_ms. A sensor at rest
- * reads where it comes to rest, and the share of the past that it keeps: both are learnt together (ZERO.md).
- * - Its amount is uncertain, and so is what a hold itself changes in this sensor alone. past_sd_Pa_q10 is the sd of
- * both: a share of what the sensor has measured, which rises in a hold and by all that it lets go of, after a contact
- * or where one moves on, and fades with PAST_ms. The share is learnt from what is left after each contact, as a size and with its sign.
- * - Where a contact moves on, that share with its sign of what a sensor lets go of is taken off its pressure. The gate does not know of it:
- * there it would hide a force.
+ * - A sensor keeps a share of what it has let go of: of by how much it was pressed more than now, fading with LET_GO_ms. This share, of
+ * either sign, and where the sensor rests are learnt together from what is left after contacts (ZERO.md). In a contact it is taken off.
+ * What else the zero was off at the touch fades. The gate does not know of it: there it would hide a force.
+ * - That share is uncertain, and so is what a hold itself changes in this sensor alone: past_sd_Pa_q10 is the sd of both. The first is a
+ * part of what it has let go of. The second rises in a hold and fades with PAST_ms; its share is the size of what is left after contacts.
  *
  * The level of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
  * is taken again if it was taken in the five seconds before its sensor was reset as it had lost its state, or stepped
@@ -76,10 +74,10 @@ struct condition_sensor {
   int32_t spread_Pa_q10;       /* 0: settled */
   int32_t memory_Pa_q10;       /* strongest press, fading */
   int32_t reached_Pa_q10;      /* the same of this contact alone */
-  int32_t past_Pa_q10;         /* what rubber may keep: rises in a hold, and by all that is let go; fades in 3 s */
-  int32_t past_share;          /* sd of that, 1 / 2^16: learnt from what is left after contacts */
-  int32_t keeps_share, learnt; /* mean, of either sign, of as many releases, KEEPS_LEARNT_MOST at most */
-  int32_t let_go_Pa_q10;       /* sum of sudden falls in this contact, as where it slides on; fades in 3 s */
+  int32_t past_Pa_q10;         /* the hold, through a low pass of 3 s */
+  int32_t past_share;          /* sd of what it changes, 1 / 2^16: the size of what is left after contacts */
+  int32_t keeps_share, learnt; /* mean of the same, of either sign, of as many releases, KEEPS_LEARNT_MOST at most */
+  int32_t let_go_Pa_q10;       /* by which it was pressed more than now; fades in 2 s */
   int32_t kept_Pa_q10;         /* let_go times keeps_share, which faded_Pa_q10 is less by */
   int32_t wander_Pa_q10;
   int32_t taken_Pa_q10;

@@ -58,8 +58,9 @@
 #define BAND_SHIFT 3                      /* an eighth of the memory may remain; ZERO.md: a sixteenth and a quarter fail */
 #define DIP_SHIFT 2                       /* a quarter may be missing */
 #define REOPEN_SHIFT 4                    /* a sixteenth: what a sudden press must exceed after FRESH_ms */
-#define PAST_ms SECONDS(3)                /* time constant of what it keeps, and of a hold's own part; strips: 1 to 4 s */
-#define PAST_SHARE 1311                   /* 2 % of it is the sd until a release shows it; the twin's after-effect: 2.3 % rms */
+#define PAST_ms SECONDS(3)                /* time constant of a hold's own part; strips: 1 to 4 s */
+#define LET_GO_ms SECONDS(2)              /* of what is let go of, and so of what is kept; strips: the middle of 1 to 4 s */
+#define PAST_SHARE 1311                   /* 2 % is the sd until releases show it; the twin's after-effect: 2.3 % rms */
 #define PAST_SHARE_LEAST 328              /* 0.5 %: releases may hide it (pads 21 to 24, gains alone) */
 #define PAST_SHARE_MOST 16384             /* a quarter; range */
 #define PAST_SHARE_FORCE 3277             /* a twentieth: twice the sd that it shows is the band of all, an eighth */
@@ -68,7 +69,7 @@
 #define PAST_HIDES_Pa 32                  /* of more the zero has too much for a sensor to rest there; choice */
 #define PAST_LEARN_SHIFT 2                /* a quarter of what each release shows; choice */
 #define KEEPS_LEARNT_MOST 16              /* releases in the mean of what it keeps; twin, seeds 101 to 104 */
-#define SUDDEN_SHIFT 6                    /* a fall by a 64th of the press between two updates is the contact's, not the rubber's */
+#define KEEPS_SURE_SHIFT 2                /* a quarter of what it keeps is unsure: it fades in unlike times */
 #define CROSS_SHIFT 2                     /* all but a quarter of the strongest memory counts for all; strips, ZERO.md */
 #define FRESH_ms ((uint32_t)SECONDS(2))   /* after a contact: a remainder may rise */
 #define REMAINDER_ms MS(700)              /* time constant of a remainder; strips: 0.5 s at least */

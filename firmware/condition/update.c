@@ -29,6 +29,9 @@ struct band {
 
 static int32_t faded(int32_t value, int32_t share) { return value - part_of(value, share); }
 
+/* By how much a sensor reads above where it rests and its pressure. */
+static int32_t kept_of(const struct condition_sensor *sensor) { return (sensor->let_go_Pa_q10 >> 10) * sensor->keeps_share >> 6; }
+
 #ifdef FT_WITHOUT_PAST
 static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q10) {
   (void)sensor;
@@ -37,9 +40,8 @@ static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q
 static void follow_past(const struct step *step) { (void)step; }
 static void forget_past(struct condition_sensor *sensor) { (void)sensor; }
 static void follow_rest(const struct step *step) { step->sensor->rests_Pa_q10 = step->sensor->level_Pa_q10; }
-void update_past_shows(struct condition *condition, uint8_t count) { (void)condition, (void)count; }
 #else
-/* Of a press: an eighth, or twice the sd of what this sensor has kept of others. */
+/* Of a press: an eighth, or twice what this sensor has kept of others. */
 static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q10) {
   return larger(of_Pa_q10 >> BAND_SHIFT, part_of(of_Pa_q10, 2 * sensor->past_share));
 }
@@ -48,13 +50,10 @@ static void follow_past(const struct step *step) {
   struct condition_sensor *sensor = step->sensor;
   const int32_t held = step->condition->gate.pressed ? clamp(step->steady_Pa_q10, 0, Pa_q10(SATURATED_Pa)) : 0;
   sensor->past_Pa_q10 += part_of(held - sensor->past_Pa_q10, share_in(step->ms, PAST_ms));
-  if (step->condition->gate.pressed) { /* what a sensor lets go of in a contact that moves, as after one */
-    const int32_t with_it = sensor->past_Pa_q10 + step->fell_Pa_q10;
-    sensor->past_Pa_q10 = larger(sensor->past_Pa_q10, clamp(with_it, 0, sensor->reached_Pa_q10));
-    const int32_t fell = size_of(step->fell_Pa_q10) > sensor->reached_Pa_q10 >> SUDDEN_SHIFT ? step->fell_Pa_q10 : 0;
-    sensor->let_go_Pa_q10 = clamp(faded(sensor->let_go_Pa_q10, share_in(step->ms, PAST_ms)) + fell, 0, Pa_q10(SATURATED_Pa));
-  }
-  step->condition->past_sd_Pa_q10[step->k] = part_of(sensor->past_Pa_q10, sensor->past_share);
+  const int32_t let_go = faded(sensor->let_go_Pa_q10, share_in(step->ms, LET_GO_ms)) + step->fell_Pa_q10;
+  sensor->let_go_Pa_q10 = clamp(let_go, 0, Pa_q10(SATURATED_Pa));
+  const int32_t unsure = larger(PAST_SHARE_LEAST, size_of(sensor->keeps_share) >> KEEPS_SURE_SHIFT) + (PAST_SHARE >> sensor->learnt);
+  step->condition->past_sd_Pa_q10[step->k] = part_of(sensor->past_Pa_q10, sensor->past_share) + part_of(sensor->let_go_Pa_q10, unsure);
 }
 
 /* What five and more sensors all keep is a force that is left: rubber keeps unlike shares. Of fewer it may be either. */
@@ -62,9 +61,9 @@ static bool is_left_by_force(const struct condition *condition, sensor_map usabl
   int pressed = 0;
   for (uint8_t k = 0; usable != 0; k++, usable >>= 1) {
     const struct condition_sensor *sensor = &condition->sensor[k];
-    if (usable & 1u && sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa)) {
+    if (usable & 1u && sensor->let_go_Pa_q10 > Pa_q10(PAST_LEAST_Pa)) {
       const int32_t off = clamped_difference(sensor->before_Pa_q10, sensor->level_Pa_q10);
-      if (off <= part_of(sensor->past_Pa_q10, PAST_SHARE_FORCE)) {
+      if (off <= part_of(sensor->let_go_Pa_q10, PAST_SHARE_FORCE)) {
         return false;
       }
       pressed++;
@@ -73,18 +72,17 @@ static bool is_left_by_force(const struct condition *condition, sensor_map usabl
   return pressed >= 5;
 }
 
-/* What is left after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd. */
+/* What is left after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd of a hold's own part. */
 static void learn_past(const struct step *step, int32_t keeps_Pa_q10) {
   struct condition_sensor *sensor = step->sensor;
   step->condition->to_learn &= ~sensor_bit(step->k);
-  const bool shows = sensor->past_Pa_q10 > Pa_q10(PAST_LEAST_Pa) && step->condition->gate.released_ms < FRESH_ms;
+  const bool shows = sensor->let_go_Pa_q10 > Pa_q10(PAST_LEAST_Pa) && step->condition->gate.released_ms < FRESH_ms;
   if (shows && !is_left_by_force(step->condition, step->usable)) {
-    const int32_t most = part_of(sensor->past_Pa_q10, PAST_SHARE_MOST), past = sensor->past_Pa_q10 >> 16;
-    const int32_t above_level = keeps_Pa_q10 + sensor->rests_Pa_q10 - sensor->level_Pa_q10, drifted = step->condition->drifted_Pa_q10;
-    const int32_t off = clamp(size_of(above_level) - drifted, 0, most), shown = port_divide(off + off / 4, past);
+    const int32_t most = part_of(sensor->let_go_Pa_q10, PAST_SHARE_MOST), let_go = sensor->let_go_Pa_q10 >> 16;
+    const int32_t off = clamp(size_of(keeps_Pa_q10) - step->condition->drifted_Pa_q10, 0, most), shown = port_divide(off + off / 4, let_go);
     sensor->past_share = larger(sensor->past_share + ((shown - sensor->past_share) >> PAST_LEARN_SHIFT), PAST_SHARE_LEAST);
     sensor->learnt += sensor->learnt < KEEPS_LEARNT_MOST;
-    sensor->keeps_share += port_divide(port_divide(clamp(keeps_Pa_q10, -most, most), past) - sensor->keeps_share, sensor->learnt);
+    sensor->keeps_share += port_divide(port_divide(clamp(keeps_Pa_q10, -most, most), let_go) - sensor->keeps_share, sensor->learnt);
   }
 }
 
@@ -97,8 +95,8 @@ static void follow_rest(const struct step *step) {
     if (step->condition->to_learn >> step->k & 1u) {
       learn_past(step, keeps);
     }
-    const int32_t off = keeps - ((sensor->past_Pa_q10 >> 10) * sensor->keeps_share >> 6);
-    const int32_t most = step->ms >> SLEW_SHIFT, past = sensor->past_Pa_q10 / Pa_q10(PAST_HIDES_Pa);
+    const int32_t off = keeps - kept_of(sensor);
+    const int32_t most = step->ms >> SLEW_SHIFT, past = sensor->let_go_Pa_q10 / Pa_q10(PAST_HIDES_Pa);
     sensor->rests_Pa_q10 += clamp(part_of(off, share_in(step->ms, FOLLOW_ms)), -most, most);
     sensor->rests_Pa_q10 += port_divide(zero - sensor->rests_Pa_q10, 1 + past * past);
   }
@@ -107,14 +105,6 @@ static void follow_rest(const struct step *step) {
 static void forget_past(struct condition_sensor *sensor) {
   sensor->past_Pa_q10 = 0;
   sensor->past_share = larger(sensor->past_share, PAST_SHARE);
-}
-
-void update_past_shows(struct condition *condition, uint8_t count) {
-  for (uint8_t k = 0; k < count; k++) {
-    struct condition_sensor *sensor = &condition->sensor[k];
-    condition->to_learn |= sensor_bit(k);
-    sensor->past_Pa_q10 = larger(sensor->past_Pa_q10, sensor->reached_Pa_q10);
-  }
 }
 #endif
 
@@ -216,8 +206,8 @@ static void hold(const struct step *step) {
   const int32_t remainder = condition->zero_Pa_q10[step->k] - sensor->rests_Pa_q10;
   int32_t *off = &condition->faded_Pa_q10[step->k];
   const int32_t gone = *off + sensor->kept_Pa_q10;
-  sensor->kept_Pa_q10 = (sensor->let_go_Pa_q10 >> 10) * sensor->keeps_share >> 6;
-  *off = gone + part_of(remainder - gone, share_in(step->ms, PAST_ms)) - sensor->kept_Pa_q10;
+  sensor->kept_Pa_q10 = kept_of(sensor);
+  *off = gone + part_of(remainder - gone, share_in(step->ms, LET_GO_ms)) - sensor->kept_Pa_q10;
   condition->margin_Pa_q10[step->k] += *off;
 }
 
@@ -332,7 +322,8 @@ static void follow(const struct step *step) {
   struct condition *condition = step->condition;
   struct condition_sensor *sensor = step->sensor;
   const bool unsure = condition->unsure;
-  condition->faded_Pa_q10[step->k] = sensor->kept_Pa_q10 = 0;
+  condition->faded_Pa_q10[step->k] = 0;
+  sensor->kept_Pa_q10 = kept_of(sensor);
   if (!unsure && settle(step)) {
     return;
   }

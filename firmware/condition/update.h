@@ -12,8 +12,5 @@ void update_begin_tare(struct condition *condition, uint8_t k, int32_t spread_Pa
 /* Whether the pressure of sensor k is more than its zero may have moved: sets its bits of firm and sudden. */
 void update_compare(struct condition *condition, uint8_t k, int32_t pressure_Pa_q10);
 
-/* A contact has ended: what the rubber of each sensor keeps shows now. */
-void update_past_shows(struct condition *condition, uint8_t count);
-
 /* By how far a barometer may drift in a contact of this length. */
 int32_t update_drift_in(uint32_t pressed_ms);

@@ -97,8 +97,8 @@ static uint32_t course(void) {
 }
 
 TEST(test_frames_are_conditioned_the_same_to_the_bit) {
-  static const uint32_t golden[GOLDEN_BLOCKS] = {0x07EFB6F3, 0x2DCB5AA7, 0x19B44BC3, 0xEB16A3B2,
-                                                 0x2316A659, 0x0A13A47A, 0xA69F778E, 0x8E1C8618};
+  static const uint32_t golden[GOLDEN_BLOCKS] = {0x99438BE2, 0xDF2135B7, 0x5A97A205, 0x4CA95B04,
+                                                 0xE7746BE6, 0xAE919378, 0x6662B206, 0xE8A3B92C};
   uint32_t found[GOLDEN_BLOCKS] = {0};
   draw_from(UINT64_C(0x7A65726F));
   for (int i = 0; i < COURSES; i++) {

@@ -158,17 +158,17 @@ TEST(test_a_force_that_is_left_again_and_again_stays_a_force) {
   }
 }
 
-/* Of what sensor 7 stands off by at a touch nothing stays in the contact: the pressure is right all the time. */
-TEST(test_what_stands_off_at_a_touch_fades_in_the_contact) {
+/* What a press leaves in sensor 7 is taken back by the next one as far as that goes, and fades: the pressure is right all the time. */
+TEST(test_what_a_press_leaves_is_taken_back_by_the_next_or_fades_in_it) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
     const int sign = i % 2 ? 1 : -1;
     begin_calm(periods_us[i / 2]);
     hold(20000 * Pa, 5);
-    release(0.04f * (float)sign, 3, 1);
-    const float left_Pa = 800.0f * (float)sign * expf(-1.0f / 3.0f);
+    release(0.04f * (float)sign, 2, 1);
+    const float left_Pa = 0.04f * (float)sign * (20000.0f * expf(-1.0f / 2.0f) - 8000.0f);
     for (int tenth = 0; tenth < 60; tenth++) {
       press(8000 * Pa);
-      frame.pressure_Pa_q10[7] += (int32_t)(1024.0f * left_Pa * expf(-0.1f / 3.0f * (float)tenth));
+      frame.pressure_Pa_q10[7] += (int32_t)(1024.0f * left_Pa * expf(-0.1f / 2.0f * (float)tenth));
       run_s(0.1f);
       TEST_ASSERT_INT32_WITHIN(150 * Pa, 8000 * Pa, conditioned.pressure_Pa_q10[7]);
     }
@@ -182,13 +182,13 @@ TEST(test_what_many_presses_leave_fades_in_the_next_one_and_is_known_as_it_moves
     begin_calm(periods_us[i / 2]);
     for (int n = 0; n < 24; n++) {
       hold((n % 3 ? 3000 : 20000) * Pa, 0.5f);
-      release(share * expf(-1.7f / 3 * (float)(n % 3)), 3, 1.2f);
+      release(share * expf(-1.7f / 2 * (float)(n % 3)), 2, 1.2f);
     }
     hold(20000 * Pa, 12);
     TEST_ASSERT_INT32_WITHIN(60 * Pa, 20000 * Pa, conditioned.pressure_Pa_q10[7]);
     press(0);
     frame.pressure_Pa_q10[1] += 20000 * Pa;
-    frame.pressure_Pa_q10[7] += (int32_t)(20000 * share) * Pa;
+    frame.pressure_Pa_q10[7] += (int32_t)(20000 * share * 0.9f) * Pa; /* after 0.2 s */
     run_s(0.2f);
     TEST_ASSERT_INT32_WITHIN(120 * Pa, 0, conditioned.pressure_Pa_q10[7]);
   }
@@ -231,7 +231,7 @@ TEST(test_what_a_sensor_keeps_shows_after_the_press_alone) {
   }
 }
 
-/* The sd of what rubber keeps: of a hold as it grows, of all that is let go, and then less in 3 s. A sensor that stood
+/* The sd of what rubber keeps: of a hold as it grows, of all that is let go, and then less in 2 and 3 s. A sensor that stood
  * off by a tenth counts for more from then on, one that did not for less. Where a contact moves on, its pressure is right. */
 TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
@@ -242,9 +242,9 @@ TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
     press(0);
     frame.pressure_Pa_q10[1] += 20000 * Pa; /* the contact moves on */
     run_s(0.2f);
-    TEST_ASSERT_INT32_WITHIN(40 * Pa, 390 * Pa, condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_INT32_WITHIN(40 * Pa, 700 * Pa, condition.past_sd_Pa_q10[7]);
     press(0);
-    TEST_ASSERT_INT32_WITHIN(40 * Pa, 390 * Pa, condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_INT32_WITHIN(40 * Pa, 700 * Pa, condition.past_sd_Pa_q10[7]);
     run_s(30);
     TEST_ASSERT_INT32_WITHIN(Pa, 0, condition.past_sd_Pa_q10[7]);
     keep(12, -0.1f, 3, 5);
@@ -255,7 +255,7 @@ TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
     run_s(0.2f);
     TEST_ASSERT_INT32_WITHIN(300 * Pa, 0, conditioned.pressure_Pa_q10[7]);
     hold(0, 0.15f);
-    TEST_ASSERT_INT32_WITHIN(500 * Pa, 2400 * Pa, condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_INT32_WITHIN(200 * Pa, 1100 * Pa, condition.past_sd_Pa_q10[7]);
     TEST_ASSERT_TRUE(condition.past_sd_Pa_q10[4] * 5 < condition.past_sd_Pa_q10[7]);
   }
 }
