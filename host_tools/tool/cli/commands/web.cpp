@@ -4,6 +4,7 @@
 #include "tool/plain_help.hpp"
 #include "web/server/page_server.hpp"
 
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
@@ -35,7 +36,10 @@ bool opens(const std::string &url) {
   char *arguments[] = {words[0].data(), words[1].data(), words[2].data(), words[3].data(), words[4].data(), nullptr};
   pid_t shell = 0;
   int status = 1;
-  return posix_spawnp(&shell, "sh", nullptr, nullptr, arguments, environ) == 0 && waitpid(shell, &status, 0) == shell && status == 0;
+  const bool begun = posix_spawnp(&shell, "sh", nullptr, nullptr, arguments, environ) == 0;
+  while (begun && waitpid(shell, &status, 0) < 0 && errno == EINTR) {
+  }
+  return status == 0;
 }
 
 int web(const WebOptions &options) {
