@@ -27,7 +27,7 @@ class Usage(CliTest):
             self.assertIn(f"Usage: fingertip {command}", page)
             self.assertLessEqual(max(map(len, page.splitlines())), 80, command)
             self.assertNotRegex(page, r"FLOAT|INT|TEXT| in \[", command)  # the library's own words
-        examples = re.findall(r"(?m)^Example: fingertip (.*)$", "".join(pages.values()))
+        examples = re.findall(r"(?m)^Examples?: fingertip (.*)$", "".join(pages.values()))
         self.assertEqual(len(examples), 6)
         self.environment["FINGERTIP_PORT"] = self.port
         for words in examples:
