@@ -29,10 +29,8 @@ struct band {
 
 static int32_t faded(int32_t value, int32_t share) { return value - part_of(value, share); }
 
-/* By how much a sensor reads above where it rests and its pressure. */
-static int32_t kept_of(const struct condition_sensor *sensor) { return (sensor->let_go_Pa_q10 >> 10) * sensor->keeps_share >> 6; }
-
 #ifdef FT_WITHOUT_PAST
+static int32_t kept_of(const struct condition_sensor *sensor) { return (void)sensor, 0; }
 static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q10) {
   (void)sensor;
   return of_Pa_q10 >> BAND_SHIFT;
@@ -41,6 +39,9 @@ static void follow_past(const struct step *step) { (void)step; }
 static void forget_past(struct condition_sensor *sensor) { (void)sensor; }
 static void follow_rest(const struct step *step) { step->sensor->rests_Pa_q10 = step->sensor->level_Pa_q10; }
 #else
+/* By how much a sensor reads above where it rests and its pressure. */
+static int32_t kept_of(const struct condition_sensor *sensor) { return (sensor->let_go_Pa_q10 >> 10) * sensor->keeps_share >> 6; }
+
 /* Of a press: an eighth, or twice what this sensor has kept of others. */
 static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q10) {
   return larger(of_Pa_q10 >> BAND_SHIFT, part_of(of_Pa_q10, 2 * sensor->past_share));
