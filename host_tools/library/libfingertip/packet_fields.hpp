@@ -24,6 +24,8 @@ inline bool is_frame(const wire_packet &packet) { return packet.type == WIRE_CON
 inline std::uint32_t flags_of(const wire_packet &packet) {
   return packet.type == WIRE_RAW ? packet.body.raw.flags : packet.body.contact.flags;
 }
+/* Whether its firmware runs on a computer, with simulated sensors. */
+inline bool is_simulated(const wire_info &info) { return text_field(info.board) == "native"; }
 /* Whether a raw packet follows each contact packet, where both are streamed. */
 inline bool sends_both(const wire_info &info) {
   constexpr std::uint32_t BOTH = WIRE_CAPABILITY_FIT | WIRE_CAPABILITY_RAW_STREAM;

@@ -9,6 +9,7 @@ import contextlib
 import functools
 import itertools
 import json
+import math
 import os
 import pathlib
 import re
@@ -24,7 +25,8 @@ import numpy.typing as npt
 from .arrays import Firmware, MeasureError, q10, round_half_away, table_of, usable_of
 from .command import check_output, printable, progress, reporter, run_tool
 from .errors import InputError
-from .files import is_recording, read_recording, write_text
+from .evaluate import add_recording_options, check_time, load_recording
+from .files import is_recording, write_text
 from .line import SENSORS_MAX, Flag
 
 FloatArray = npt.NDArray[np.float64]
@@ -111,10 +113,12 @@ def read_pad(pad: Described) -> Pad:
             places = np.array(text["places_mm"], float).reshape(-1, 2)
         else:
             columns, rows = int(text["columns"]), int(text["rows"])
-            if not 1 <= columns * rows <= SENSORS_MAX:
-                raise ValueError(f"{columns * rows} sensors, and at most {SENSORS_MAX} are possible")
+            if not (1 <= columns <= SENSORS_MAX and 1 <= rows <= SENSORS_MAX):
+                raise ValueError(f"{columns} x {rows} sensors: give 1 to {SENSORS_MAX} of each")
             nodes = np.column_stack(np.divmod(np.arange(columns * rows), rows))
             places = pitch_mm * (nodes - (np.array([columns, rows]) - 1) / 2)
+        if not 1 <= len(places) <= SENSORS_MAX:
+            raise ValueError(f"{len(places)} sensors: 1 to {SENSORS_MAX} are possible")
         if not (0.01 <= pitch_mm <= 1000 and (np.hypot(*places.T) <= 128 * pitch_mm).all()):
             raise ValueError(f"pitch_mm {pitch_mm:g} is out of range; give 0.01 to 1000 mm, and places within 128 pitches")
         thickness_mm, overhang_mm = (float(rubber.get(key, 0)) for key in ("thickness_mm", "overhang_mm"))
@@ -473,16 +477,21 @@ def read_table(path: str, sensors: int, first: int | None = None, time: int | No
     return table[:, begin : begin + sensors], None if column is None else table[:, column - 1]
 
 
-def _recorded(path: str, device: str | None) -> tuple[FloatArray, FloatArray, Mapping[str, Any]]:
-    """(Pa above the fingertip's own zero [row, sensor], time, pad) of a recording. Frames whose pressures were lost are left out."""
-    recording = read_recording(path, serial=device)
+def _recorded(options: argparse.Namespace) -> tuple[FloatArray, FloatArray, Mapping[str, Any]]:
+    """(Pa above the fingertip's own zero [row, sensor], time, pad) of a recording. Frames without pressures of their own (lost or held) are
+    left out."""
+    recording = load_recording(options)
+    check_time(recording)
     known, pressures = recording.metadata, recording.sensors_Pa - recording.tare_Pa
     valid, *wrong = (np.nan_to_num(recording[name]).astype(np.int64) for name in ("valid", "saturated", "doubtful"))
     pressures[((valid & ~wrong[0] & ~wrong[1])[:, None] >> np.arange(pressures.shape[1])) & 1 == 0] = np.nan
     there = np.isfinite(pressures).any(axis=1)
+    if not there.any():
+        raise InputError(f"{options.recording}: has no pressures; record with the raw stream on")
     places = [[float(each) for each in known.get(name, "").split()] for name in ("x_mm", "y_mm")]
     rubber = {name: known.get(f"pad_{name}", 0) for name in ("thickness_mm", "overhang_mm")}
-    pad = {"name": known.get("serial", path), "pitch_mm": known.get("pitch_mm"), "places_mm": list(zip(*places)), "rubber": rubber}
+    name = known.get("serial", options.recording)
+    pad = {"name": name, "pitch_mm": known.get("pitch_mm"), "places_mm": list(zip(*places)), "rubber": rubber}
     return pressures[there], recording["t_us"][there] / 1e6, pad
 
 
@@ -495,10 +504,9 @@ def _rises(values: FloatArray) -> bool:
 def main(argv: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="fingertip fit", description=(__doc__ or "").split(":")[0] + ".", allow_abbrev=False)
     parser.add_argument(
-        "file", metavar="FILE.csv", help="a column for each sensor, and perhaps one of the time before; or a recording; -: standard input"
+        "recording", metavar="FILE.csv", help="a column for each sensor, perhaps one of the time before; or a recording; -: standard input"
     )
     parser.add_argument("--pad", metavar="NAME|FILE.json", help="one of the tool's, or a file that describes it; default: a recording's")
-    parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in a recording")
     parser.add_argument("--first", type=int, metavar="N", help="column of sensor 0, counted from 1; the others follow it")
     parser.add_argument("--time", type=int, metavar="N", help="column of the time in seconds; without one each row is a contact of its own")
     parser.add_argument("--unit", default="Pa", metavar="UNIT", help=f"{', '.join(UNITS)}; default: Pa")
@@ -510,20 +518,25 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--calibrate", action="store_true", help="find the gains instead: fingertip calibrate --from FILE --pad NAME")
     parser.add_argument("--weight", type=float, metavar="GRAMS", help="its mass: then forces are calibrated too")
     parser.add_argument("-o", "--output", metavar="FILE", help="default: standard output")
-    parser.add_argument("--overwrite", action="store_true", help="replace it if it exists")
+    add_recording_options(parser)
     options = parser.parse_args(argv)
     if options.weight is not None and not options.calibrate:
         parser.error("--weight is that of --calibrate; give both")
     if options.calibrate and options.calibration is not None:
         parser.error("--calibrate makes a calibration, and takes no --calibration")
+    is_recorded = options.first is None and is_recording(options.recording)
+    if is_recorded and (options.time is not None or options.unit != "Pa"):
+        parser.error("--time and --unit are those of a table; a recording has its own")
+    if not is_recorded and (options.salvage or options.device or options.from_s or options.to_s < math.inf):
+        parser.error("--salvage, --device, --from and --to are of recordings, and this is a table")
     warn = reporter(parser.prog)
     warnings.showwarning = lambda message, *_: warn(f"warning: {message}")
     if options.output is not None:
         described = options.pad if options.pad and options.pad.endswith(".json") else None
-        check_output(options.output, options.file, options.calibration, described, replace=options.overwrite)
-    recorded = _recorded(options.file, options.device) if options.first is None and is_recording(options.file) else None
+        check_output(options.output, options.recording, options.calibration, described, replace=options.overwrite)
+    recorded = _recorded(options) if is_recorded else None
     pad = options.pad or (recorded and recorded[2]) or parser.error("--pad NAME, or FILE.json, is needed: what the columns are of")
-    pressures, time_s = recorded[:2] if recorded else read_table(options.file, len(read_pad(pad).x_mm), options.first, options.time)
+    pressures, time_s = recorded[:2] if recorded else read_table(options.recording, len(read_pad(pad).x_mm), options.first, options.time)
     common = {"unit": options.unit, "zero_rows": options.zero, "noise_Pa": options.noise, "time_s": time_s}
     if options.calibrate:
         force_N = None if options.weight is None else 9.80665e-3 * options.weight

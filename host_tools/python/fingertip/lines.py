@@ -34,6 +34,7 @@ class LineFile:
     def __init__(self, path: "str | os.PathLike[str]", replace: bool) -> None:
         self.path = os.fspath(path)
         try:
+            self._is_new = not os.path.exists(self.path)
             self._file = open(self.path, "ab" if replace else "xb", buffering=0)
             if os.path.isfile(self.path):
                 _lock(self._file.fileno())
@@ -67,7 +68,7 @@ class LineFile:
     def close(self) -> None:
         try:
             self._file.close()
-            if not self._length and os.path.isfile(self.path):  # nothing could be written
-                os.remove(self.path)
+            if not self._length and self._is_new:  # nothing could be written
+                os.remove(os.path.realpath(self.path))
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; the file ends early") from None

@@ -42,7 +42,7 @@ void fingertip::measure::describe(const Array &layout, const std::vector<Placeme
   found.sigma_sd_mm = solution.sigma_sd_mm;
   found.dip = solution.dip;
   found.dip_sd = solution.dip_sd;
-  found.position_mm = solution.spread.position_mm;
+  found.position_mm = solution.solved ? solution.spread.position_mm : 0.0;
   found.halves_shape = judgement.halves_shape;
   found.halves_gauge = judgement.halves_gauge;
   if (const auto scale = force_scale(layout, placements, stored, force_N, shape); stored.solved && scale) {

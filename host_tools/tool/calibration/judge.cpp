@@ -232,7 +232,7 @@ Reason lacking(const Array &array, const std::vector<Placement> &placements, con
     const auto [least, most] = std::minmax_element(places.begin(), places.end());
     const auto [first, last] = std::minmax_element(sensors.begin(), sensors.end());
     const double end = END_SHARE * (*last - *first);
-    return *least > *first + end || *most < *last - end;
+    return std::min(*least, *last) > *first + end || std::max(*most, *first) < *last - end; /* not across sensors in one line */
   };
   if (unloaded || lacks_an_end(x_mm, array.x_mm) || lacks_an_end(y_mm, array.y_mm)) {
     return Reason::one_end;

@@ -195,7 +195,7 @@ private:
       add(Verdict::warn, "firmware", text + "; this tool is of version " + version(facts_.tool_version),
           "install this tool's with `fingertip flash`, or use the other's tool");
     }
-    if (text_field(info.board) == "native") {
+    if (is_simulated(info)) {
       add(Verdict::ok, "board", "none: its firmware runs on a computer, with simulated sensors");
     } else if (!wiring_ || wiring_->sensor_count != info.sensor_count) {
       add(Verdict::warn, "board", text_field(info.board) + " with " + count(info.sensor_count, "sensor") + " is unknown to this tool",

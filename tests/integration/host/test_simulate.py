@@ -82,8 +82,8 @@ class Presses(SimulateTest):
             process = self.start("doctor", "--port", "sim:", "--json", "--seconds", "2")
             found = json.loads(process.communicate()[0])["findings"]
             self.assertEqual([one for one in found if one["verdict"] == "bad"], [])
-            # the rule is of the machine; a weight stands on it now and then
-            self.assertLessEqual({one["check"] for one in found if one["verdict"] == "warn"}, {"rule", "zero"})
+            # a weight stands on it now and then
+            self.assertLessEqual({one["check"] for one in found if one["verdict"] == "warn"}, {"zero"})
 
     def test_calibrating_finds_the_gains(self):
         truth_csv = os.path.join(self.folder, "truth.csv")

@@ -465,7 +465,7 @@ void add_calibrate(CommandLine &line) {
              "With --from: its columns are pressures of this array. Takes the other options of fingertip fit, and writes what its "
              "--calibration takes")
       ->needs(from)
-      ->excludes(drag, dry_run, yes);
+      ->excludes(drag, dry_run, yes, command->get_option("--port"), command->get_option("--transport"));
   CLI::Option *show =
       command->add_flag("--show", options->show, "Show the fingertip's calibration")->excludes(weight, force, drag, from, dry_run, yes);
   command->add_flag("--erase", options->erase, "Erase its calibration, after a question")

@@ -322,7 +322,7 @@ int pad_command(const PadOptions &options) {
 
 int loader(const Choice &choice) {
   Device device(choice);
-  if (text_field(device.session.info().body.info.board) == "native") {
+  if (is_simulated(device.session.info().body.info)) {
     throw Error("a simulated fingertip has no USB loader; Ctrl-C ends `fingertip simulate`");
   }
   device.session.command(command_loader());

@@ -177,7 +177,7 @@ std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &im
   std::string serial = way.serial;
   try {
     wire_info info = session.info(QUICK).body.info;
-    if (text_field(info.board) == "native") {
+    if (is_simulated(info)) {
       throw Error("fingertip " + text_field(info.serial) + " is simulated, and takes no firmware; name another with --device");
     }
     if (text_field(info.board) != image.board) {
