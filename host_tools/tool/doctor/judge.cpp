@@ -127,8 +127,8 @@ private:
 
   void rule() {
     bool denied = facts_.failure && facts_.failure->code == ErrorCode::permission_denied;
-    const bool is_wanted = facts_.is_plugged_in && !(facts_.failure && facts_.failure->code == ErrorCode::not_simulated);
-    if (!is_wanted && !denied) {
+    const bool simulated = facts_.failure ? facts_.failure->code == ErrorCode::not_simulated : facts_.info && is_simulated(*facts_.info);
+    if ((simulated || !facts_.is_plugged_in) && !denied) {
       return;
     }
     if (facts_.rule.empty()) {
