@@ -25,6 +25,8 @@ constexpr double CREEPS_mm_s = 4.0, CREEPS_s = 0.15;
 // A contact that held within LATELY_s does not slide below this share of the ratio that it held, unless it became
 // slick. Then it slides by FAR_mm and more; squeezed rubber, and an object that was just caught, move less.
 constexpr double LATELY_s = 0.2, BEGINS_AT = 0.7, FAR_mm = 1.0;
+// The place of a contact moves by less than this times the share of the force that the gripper has let go of lately.
+constexpr double SHIFTS_mm = 1.0;
 // Friction that falls as a slide begins is followed with this time constant.
 constexpr double FALLS_s = 0.06;
 // The load of an object that slides and does not slow down is its friction plus the force that stops
@@ -96,7 +98,9 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
   fastest_mm_s_ = std::max(fastest_mm_s_, readings.speed_mm_s);
   lately_ -= std::min(passed_s / (sliding_ ? FALLS_s : LATELY_s), 1.0) * lately_;
   const bool creeps = readings.speed_mm_s < CREEPS_mm_s && now_s - still_s_ < CREEPS_s;
-  const bool holds = moved_mm_ < FAR_mm && readings.load_N < BEGINS_AT * lately_ * readings.grip_N;
+  most_N_ = std::max(most_N_ - std::min(passed_s / LATELY_s, 1.0) * most_N_, readings.grip_N);
+  const bool shifts = moved_mm_ < SHIFTS_mm * (1.0 - readings.grip_N / most_N_);
+  const bool holds = moved_mm_ < FAR_mm && (shifts || readings.load_N < BEGINS_AT * lately_ * readings.grip_N);
   const bool was_sliding = sliding_;
   sliding_ = readings.slides && (was_sliding || !(holds || creeps));
   goes_on_ = sliding_ && !holds && readings.speed_mm_s >= fastest_mm_s_;

@@ -73,6 +73,7 @@ private:
   double ratio_ = 0.0;    // smoothed tangential over normal force at rest
   double lately_ = 0.0;   // largest ratio within LATELY_s
   double moved_mm_ = 0.0; // length of the present reported slide
+  double most_N_ = 0.0;   // largest grip within LATELY_s
   bool begun_ = false, sliding_ = false, goes_on_ = false, has_seen_load_ = false, was_loaded_ = false, is_set_ = false, by_place_ = false;
   std::uint32_t slides_ = 0;
 };

@@ -147,6 +147,24 @@ TEST(Grip, AShortMotionFarBelowWhatHoldsIsNoSlide) {
   EXPECT_EQ(world.report.slides, 1u);
 }
 
+// Rubber that is let go moves a contact too.
+TEST(Grip, AShortMotionAsTheGripperOpensIsNoSlide) {
+  for (const double speed_mm_s : {6.0, 30.0}) {
+    GripWorld world({}, gripper_traits("2f85"));
+    world.stiffness = 6.0;
+    world.carry(3.0, 0.3, 1.0);
+    world.pull(1.0, 0.3);
+    const double before_N = world.force_N, friction = world.report.friction;
+    for (int i = 0; i < 4000 && world.force_N > 0.9 * before_N; i++) {
+      world.run(0.001);
+    }
+    ASSERT_LT(world.force_N, 0.9 * before_N);
+    world.slide(world.load_N / world.force_N, speed_mm_s, 0.02);
+    EXPECT_EQ(world.report.slides > 0, speed_mm_s > 10.0);
+    EXPECT_EQ(world.report.friction < friction, speed_mm_s > 10.0);
+  }
+}
+
 // What tells no load will tell no slide either.
 TEST(Grip, NothingIsMissingWhereNoLoadIsTold) {
   for (double stiffness = 4.0; stiffness < 12.0; stiffness += 0.5) {
