@@ -32,18 +32,18 @@ endif()
 #   FULL_GRID         the kernel for full rectangles: faster, and with separate widths and ELONGATED (fit.h); without
 #                     it, that for missing sensors fits all frames
 #   OUTLIERS          a search for a sensor whose reading does not belong to the others'; FIT_GENERAL has it always
-#   TANGENTIAL_DOUBT  what a tangential force that is not estimated does to the standard deviation of the location
-#                     (fit_doubt.h), and learning from touches how far gains are apart (fit_gains.h)
+#   TANGENTIAL_BIAS  what a tangential force that is not estimated does to the standard deviation of the location
+#                     (fit_bias.h), and learning from touches how far gains are apart (fit_gains.h)
 #   SLIP              slip, and the command that sets it
 #   TANGENTIAL        tangential force, and the commands that bring and erase the pad's profile
 #   SHAPES            contact shapes: two contacts, edges (fit_shapes.h)
 #   RAW_STREAM        the raw packets
 #   SYNC              the sync pin, its packets, and the command that sets it
-set(FINGERTIP_CAPABILITIES FIT FULL_GRID OUTLIERS TANGENTIAL_DOUBT SLIP TANGENTIAL SHAPES RAW_STREAM SYNC)
+set(FINGERTIP_CAPABILITIES FIT FULL_GRID OUTLIERS TANGENTIAL_BIAS SLIP TANGENTIAL SHAPES RAW_STREAM SYNC)
 set(capabilities_of_raw RAW_STREAM)
 set(capabilities_of_press FIT)
 set(capabilities_of_slip FIT FULL_GRID SLIP RAW_STREAM SYNC)
-set(capabilities_of_grasp FIT FULL_GRID OUTLIERS TANGENTIAL_DOUBT SLIP TANGENTIAL RAW_STREAM SYNC)
+set(capabilities_of_grasp FIT FULL_GRID OUTLIERS TANGENTIAL_BIAS SLIP TANGENTIAL RAW_STREAM SYNC)
 set(capabilities_of_shapes ${capabilities_of_grasp} SHAPES)
 set(capabilities_of_paper FIT FULL_GRID OUTLIERS SLIP RAW_STREAM SYNC)
 foreach(capability IN LISTS FINGERTIP_CAPABILITIES)
@@ -63,7 +63,7 @@ foreach(capability IN LISTS FINGERTIP_CAPABILITIES)
   set(FT_WITH_${capability} $<BOOL:${wanted}>) # 0 or 1
   set(has_${capability} ${wanted})
 endforeach()
-foreach(capability FULL_GRID OUTLIERS TANGENTIAL_DOUBT SLIP TANGENTIAL)
+foreach(capability FULL_GRID OUTLIERS TANGENTIAL_BIAS SLIP TANGENTIAL)
   if(has_${capability} AND NOT has_FIT)
     message(FATAL_ERROR "FINGERTIP_${capability} needs FINGERTIP_FIT: it is found from fits")
   endif()

@@ -25,10 +25,10 @@ struct findings {
   struct contact_input contact_input;       /* contact_stage, but for .tangential */
   struct frame frame;                       /* from the scan */
   struct conditioned conditioned;           /* condition_stage: pressures above the zero, and whether anything touches */
-  struct fit_result fit;                    /* location_stage; doubt_stage widens its standard deviation */
+  struct fit_result fit;                    /* location_stage; uncertainty_stage widens its standard deviation */
   struct contact_force force;               /* location_stage: the force of the fit, scaled */
   const struct fit_tangential *tangential;  /* tangential_stage: the estimate; NULL: there is none */
   struct tangential_force tangential_force; /* tangential_stage: the estimate in the scales of the pad */
   struct motion motion;                     /* motion_update */
-  struct shapes_place location;             /* shapes_stage: the location to report */
+  struct shapes_location location;          /* shapes_stage: the location to report */
 };

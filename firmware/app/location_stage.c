@@ -16,16 +16,16 @@
 
 #if FT_WITH_FIT_GENERAL
 #define INIT_ARRAY fit_array_init
-#define FIT fit_gaussian_follow
+#define FIT fit_gaussian_update
 #elif FT_WITH_OUTLIERS
 #define INIT_ARRAY fit_array_init_grid
-#define FIT fit_gaussian_grid_follow
+#define FIT fit_gaussian_grid_update
 #elif FT_WITH_FULL_GRID
 #define INIT_ARRAY fit_array_init_grid
-#define FIT(array, pressure, usable, settings, watch, result) fit_gaussian_grid_plain(array, pressure, usable, settings, result)
+#define FIT(array, pressure, usable, settings, outliers, result) fit_gaussian_grid_plain(array, pressure, usable, settings, result)
 #else
 #define INIT_ARRAY fit_array_init_grid
-#define FIT(array, pressure, usable, settings, watch, result) fit_gaussian_grid_small(array, pressure, usable, settings, result)
+#define FIT(array, pressure, usable, settings, outliers, result) fit_gaussian_grid_small(array, pressure, usable, settings, result)
 #endif
 
 void location_stage_start(struct location_stage *own) {
@@ -42,13 +42,13 @@ void location_stage_start(struct location_stage *own) {
 void location_stage_process(struct location_stage *own, const int32_t *past_sd_Pa_q10, struct findings *found) {
   const uint32_t t_us = (uint32_t)found->frame.t_us;
   if (!found->conditioned.contact || t_us - own->frame_us >= OUTLIER_EACH_FRAME_us) {
-    memset(&own->watch, 0, sizeof own->watch);
+    memset(&own->outliers, 0, sizeof own->outliers);
   }
   own->frame_us = t_us;
   if (found->conditioned.contact) {
     own->settings.noise_Pa_q10 = found->frame.noise_Pa_q10;
     memcpy(own->settings.past_sd_Pa_q10, past_sd_Pa_q10, sizeof own->settings.past_sd_Pa_q10);
-    FIT(&own->array, found->conditioned.pressure_Pa_q10, found->conditioned.usable, &own->settings, &own->watch, &found->fit);
+    FIT(&own->array, found->conditioned.pressure_Pa_q10, found->conditioned.usable, &own->settings, &own->outliers, &found->fit);
     own->failures += !(found->fit.flags & CONTACT_FLAG_FIT_VALID);
   } else {
     memset(&found->fit, 0, sizeof found->fit);
@@ -121,11 +121,11 @@ void location_stage_use_calibration(struct location_stage *own, const struct cal
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     const struct sensor_calibration *sensor = calibration ? &calibration->sensors[k] : NULL;
     if (sensor) {
-      own->own[k] = (struct fit_own){q15_pitches(sensor->off_x_um), q15_pitches(sensor->off_y_um), sensor->wider_q15};
+      own->deviations[k] = (struct fit_deviation){q15_pitches(sensor->off_x_um), q15_pitches(sensor->off_y_um), sensor->wider_q15};
     }
     own->settings.gain_sd_q16[k] = (uint16_t)((sensor ? sensor->gain_sd : DEFAULT_GAIN_SD) * 65536.0f + 0.5f);
   }
-  own->settings.own = DEFAULT_USES_SHAPE && calibration ? own->own : NULL;
+  own->settings.deviations = DEFAULT_USES_SHAPE && calibration ? own->deviations : NULL;
   set_shape(own);
 }
 

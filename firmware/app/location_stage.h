@@ -15,8 +15,8 @@ struct location_stage {
   bool has_profile;                      /* a pad's profile is in use */
   struct fit_array array;
   struct fit_settings settings;
-  struct fit_own own[FT_MAX_SENSORS]; /* sensor positions and widths of the calibration in use */
-  struct fit_watch watch;             /* search for an outlier among the sensors, of the contact under way */
+  struct fit_deviation deviations[FT_MAX_SENSORS]; /* sensor positions and widths of the calibration in use */
+  struct fit_outlier_state outliers;               /* search for an outlier among the sensors, of the contact under way */
 };
 
 void location_stage_start(struct location_stage *own);

@@ -74,8 +74,8 @@ static __attribute__((noinline)) void judge_fit(struct stages *stages, struct fi
 #if FT_WITH_SHAPES
   shapes_stage_judge_tangential(&stages->shapes, found);
 #endif
-#if FT_WITH_TANGENTIAL_DOUBT
-  doubt_stage_process(&stages->doubt, &stages->location, found);
+#if FT_WITH_TANGENTIAL_BIAS
+  uncertainty_stage_process(&stages->doubt, &stages->location, found);
 #endif
 #if FT_WITH_TANGENTIAL
   begin(found, CRASH_AT_CONTACT);
@@ -159,8 +159,8 @@ void stages_follow(struct stages *stages, const struct findings *found, struct s
     readings_doubt(&scan->readings, stages->plausibility.apart);
   }
 #endif
-#if FT_WITH_TANGENTIAL_DOUBT
-  doubt_stage_follow(&stages->doubt, &stages->location, found);
+#if FT_WITH_TANGENTIAL_BIAS
+  uncertainty_stage_follow(&stages->doubt, &stages->location, found);
 #endif
 }
 
@@ -222,8 +222,8 @@ void stages_use_calibration(struct stages *stages, const struct findings *found,
 #if FT_WITH_SLIP
   slip_reset(&stages->slip); /* other gains move the location */
 #endif
-#if FT_WITH_TANGENTIAL_DOUBT
-  doubt_stage_forget_gains(&stages->doubt);
+#if FT_WITH_TANGENTIAL_BIAS
+  uncertainty_stage_forget_gains(&stages->doubt);
 #endif
   stages_each_second(stages, found); /* the force scale */
 }

@@ -6,7 +6,7 @@
  *   tangential_stage   tangential force, which the second processor estimates meanwhile
  *   shapes_stage       shape of the contact, the same
  *   contact_stage      flags, slip
- *   doubt_stage        error by a tangential force that is not estimated
+ *   uncertainty_stage        error by a tangential force that is not estimated
  *   motion_update      velocity, slide
  *
  * Beside them the sync pin (sync.h) is a capability of some scenes. */
@@ -14,7 +14,6 @@
 
 #include "app/condition_stage.h"
 #include "app/contact_stage.h"
-#include "app/doubt_stage.h"
 #include "app/findings.h"
 #include "app/jobs.h"
 #include "app/line.h"
@@ -22,6 +21,7 @@
 #include "app/shapes_stage.h"
 #include "app/sync.h"
 #include "app/tangential_stage.h"
+#include "app/uncertainty_stage.h"
 #include "condition/plausibility.h"
 #include "store/store.h"
 
@@ -38,8 +38,8 @@ struct stages {
 #if FT_WITH_SLIP
   struct slip_history slip;
 #endif
-#if FT_WITH_TANGENTIAL_DOUBT
-  struct doubt_stage doubt;
+#if FT_WITH_TANGENTIAL_BIAS
+  struct uncertainty_stage doubt;
 #endif
 #if FT_WITH_SYNC
   struct sync sync;

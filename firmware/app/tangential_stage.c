@@ -150,7 +150,7 @@ void tangential_stage_use_profile(struct tangential_stage *own, const struct pad
 static int32_t off_um(const struct calibration *calibration) {
   uint32_t sum_um = 0;
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
-    sum_um += fixed_size(calibration->sensors[k].off_x_um) + fixed_size(calibration->sensors[k].off_y_um);
+    sum_um += fixed_magnitude(calibration->sensors[k].off_x_um) + fixed_magnitude(calibration->sensors[k].off_y_um);
   }
   return port_divide((int32_t)sum_um, geometry.sensor_count);
 }

@@ -58,7 +58,7 @@ static void put_report(const struct shapes_question *question, const struct fit_
     const float chi_square = fminf(result->chi_square[0], result->chi_square[1]);
     report->doubt = fmaxf(chi_square / (float)FIT_SHAPES_ERRORS, 1.0f);
   }
-  if (result->shape == FIT_SHAPE_PULLED || result->shape == FIT_SHAPE_ELONGATED) {
+  if (result->shape == FIT_SHAPE_TANGENTIAL || result->shape == FIT_SHAPE_ELONGATED) {
     report->from_fit_x_mm = result->x_mm[0] - question->fit.x_mm;
     report->from_fit_y_mm = result->y_mm[0] - question->fit.y_mm;
   }
@@ -88,12 +88,13 @@ void shapes_estimate(void *job) {
   }
 }
 
-struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit, const struct tangential_force *force) {
-  struct shapes_place place = {fit->x_mm, fit->y_mm, fit->location_sd_mm};
+struct shapes_location shapes_locate(const struct shapes_report *report, const struct fit_result *fit,
+                                     const struct tangential_force *force) {
+  struct shapes_location place = {fit->x_mm, fit->y_mm, fit->location_sd_mm};
   if (force) {
-    place = (struct shapes_place){force->x_mm, force->y_mm, force->location_sd_mm};
+    place = (struct shapes_location){force->x_mm, force->y_mm, force->location_sd_mm};
   }
-  const bool is_pulled = report->shape == FIT_SHAPE_PULLED;
+  const bool is_pulled = report->shape == FIT_SHAPE_TANGENTIAL;
   if (report->shape == FIT_SHAPE_ROUND) {
     place.location_sd_mm *= report->doubt;
   } else if (report->shape == FIT_SHAPE_ELONGATED || (is_pulled && !force)) {
@@ -107,7 +108,7 @@ struct shapes_place shapes_locate(const struct shapes_report *report, const stru
 uint32_t shapes_flags(const struct shapes_report *report) {
   switch (report->shape) {
   case FIT_SHAPE_ROUND:
-  case FIT_SHAPE_PULLED: return CONTACT_FLAG_SHAPE_VALID;
+  case FIT_SHAPE_TANGENTIAL: return CONTACT_FLAG_SHAPE_VALID;
   case FIT_SHAPE_ELONGATED: return CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_EDGE;
   case FIT_SHAPE_TWO: return CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_TWO_CONTACTS;
   case FIT_SHAPE_NONE: return CONTACT_FLAG_SHAPE_VALID | CONTACT_FLAG_SHAPE_UNKNOWN;

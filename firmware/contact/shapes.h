@@ -55,7 +55,7 @@ uint8_t shapes_parts(uint64_t apart_us);
 void shapes_estimate(void *job);
 
 /* The one place of a contact. */
-struct shapes_place {
+struct shapes_location {
   float x_mm, y_mm, location_sd_mm;
 };
 
@@ -63,7 +63,8 @@ struct shapes_place {
  * nor the Gaussian a tangential force. So of a long contact, and of a pulled one without an estimate, what lies between that location and
  * the middle that the shape has is part of the standard deviation. It is not the place: rubber that remembers makes a round object look
  * long or pulled, with its middle further off. The standard deviation of a round contact grows where its shape leaves residuals. */
-struct shapes_place shapes_locate(const struct shapes_report *report, const struct fit_result *fit, const struct tangential_force *force);
+struct shapes_location shapes_locate(const struct shapes_report *report, const struct fit_result *fit,
+                                     const struct tangential_force *force);
 
 /* The flags that the report adds to those of a contact. */
 uint32_t shapes_flags(const struct shapes_report *report);

@@ -25,7 +25,7 @@ void tangential_use(struct tangential_settings *tangential, const struct pad_pro
   tangential->tangential_scale_sd = profile->tangential_scale_sd;
   tangential->from_touch = profile->from_touch != 0;
   off_um = calibrated ? off_um : TANGENTIAL_USUAL_OFF_um;
-  tangential->place_square_q26 = off_um * off_um * PLACES_Q26 + (bytes_from_f32(profile->overhang_mm) != 0 ? ENDS_SQUARE_Q26 : 0);
+  tangential->location_variance_q26 = off_um * off_um * PLACES_Q26 + (bytes_from_f32(profile->overhang_mm) != 0 ? ENDS_SQUARE_Q26 : 0);
   float edges[PAD_EDGE_KINDS][PAD_EDGE_TERMS];
   memcpy(edges, &profile->edges, sizeof edges);
   for (int kind = 0; kind < PAD_EDGE_KINDS; kind++) {
@@ -137,10 +137,10 @@ static bool without_edges(const struct tangential_settings *settings, const stru
 
 /* Packed, so that arguments and result go in registers. */
 NOINLINE static uint64_t packed_sum(uint64_t a, uint64_t b) {
-  return scaled_pack(short_of(scaled_add(scaled_unpack(a), scaled_unpack(b))));
+  return scaled_pack(scaled_short(scaled_add(scaled_unpack(a), scaled_unpack(b))));
 }
 NOINLINE static uint64_t packed_quotient(uint64_t a, uint64_t b) {
-  return scaled_pack(scaled_div(short_of(scaled_unpack(a)), short_of(scaled_unpack(b))));
+  return scaled_pack(scaled_div(scaled_short(scaled_unpack(a)), scaled_short(scaled_unpack(b))));
 }
 FIXED_INLINE struct scaled sum_of(struct scaled a, struct scaled b) { return scaled_unpack(packed_sum(scaled_pack(a), scaled_pack(b))); }
 FIXED_INLINE struct scaled quotient_of(struct scaled a, struct scaled b) {
@@ -163,7 +163,7 @@ NOINLINE static struct scaled squares_of(int32_t a, int32_t b, int32_t q) {
 static int32_t pulled_q14(int32_t ratio_x_q26, int32_t ratio_y_q26, int32_t sd_q26) {
   const struct scaled one = {1 << 14, -14}, per_6 = {21845, -17};
   const struct scaled usual = {USUAL_SQUARE_Q26 >> 6, 6 - 26};
-  uint32_t x = fixed_size(ratio_x_q26), y = fixed_size(ratio_y_q26), size = x > y ? x : y;
+  uint32_t x = fixed_magnitude(ratio_x_q26), y = fixed_magnitude(ratio_y_q26), size = x > y ? x : y;
   if (size >= RATIO_SURE_Q26 || size >= (uint32_t)sd_q26 * SURE_SDS) {
     return 1 << 14;
   }
@@ -189,7 +189,7 @@ static void weigh_force(const struct tangential_settings *settings, struct fit_t
   sd_q26 = sd_q26 < RATIO_SD_MIN_Q26 ? RATIO_SD_MIN_Q26 : sd_q26;
   const int32_t pulled = pulled_q14(ratio_x_q26, ratio_y_q26, sd_q26);
   const int32_t not_pulled = (1 << 14) - pulled;
-  const int32_t *moved = found->moved_q20_mm;
+  const int32_t *moved = found->shift_q20_mm;
   const int32_t dx_q20 = fixed_mul_q26(ratio_x_q26, moved[0]);
   const int32_t dy_q20 = fixed_mul_q26(ratio_y_q26, moved[1]);
   found->x_mm = fit_float(fit_fixed(found->x_mm, 20) - fixed_mul_16(dx_q20, not_pulled) * 4, -20);
@@ -197,13 +197,13 @@ static void weigh_force(const struct tangential_settings *settings, struct fit_t
   struct scaled variance = squares_of(fit_fixed(found->location_sd_mm, 20), 0, 20);
   const struct scaled sixteenth = {variance.mantissa, variance.exponent - 4};
   struct scaled of_force = scaled_mul(squares_of(moved[0], moved[1], 20), squares_of(sd_q26, 0, 26));
-  of_force = scaled_mul(of_force, scaled_from(fit_fixed(found->variance_per_pull, 20), -20));
+  of_force = scaled_mul(of_force, scaled_from(fit_fixed(found->variance_per_tangential, 20), -20));
   of_force.mantissa = -of_force.mantissa;
   const struct scaled share = {not_pulled, -14}, other = {pulled, -14};
   const struct scaled between = scaled_mul(squares_of(dx_q20, dy_q20, 20), other);
   variance = sum_of(variance, scaled_mul(sum_of(between, of_force), share));
   const bool small = sum_of(variance, (struct scaled){-sixteenth.mantissa, sixteenth.exponent}).mantissa < 0;
-  const struct scaled root = scaled_sqrt(sum_of(small ? sixteenth : variance, scaled_from(settings->place_square_q26, -26)));
+  const struct scaled root = scaled_sqrt(sum_of(small ? sixteenth : variance, scaled_from(settings->location_variance_q26, -26)));
   found->location_sd_mm = fit_float(root.mantissa, root.exponent);
 }
 

@@ -14,7 +14,7 @@ struct tangential_settings {
   float tangential_scale; /* tangential force is this and force_scale times the estimate's */
   float tangential_scale_sd;
   bool from_touch;
-  int32_t place_square_q26;                          /* mm^2, variance that no residual shows, of sensors' places and of ends */
+  int32_t location_variance_q26;                     /* mm^2, variance that no residual shows, of sensors' places and of ends */
   int32_t edges_q20[PAD_EDGE_KINDS][PAD_EDGE_TERMS]; /* of the profile, in the order there */
   float location_sd_limit_mm;                        /* UNCERTAIN above it */
 };

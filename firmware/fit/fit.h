@@ -7,8 +7,7 @@
  * A rectangular grid, with every sensor or without some, takes fixed point. Everything else takes float32. Both use integer exponentials
  * and logarithms, so that a Cortex-M0+, a Cortex-M4F and a PC compute the same bits. Main context only: they divide with port/divide.h.
  *
- * Sensors on a line do not show where a contact lies across it. The fit holds the location to the
- * line. p0 and force are those of a contact whose centre is there. */
+ * Sensors on a line do not show where a contact lies across it. The fit assumes that its centre is on the line. */
 #pragma once
 
 #include "common/status.h"
@@ -28,10 +27,8 @@ enum ft_status fit_array_init(struct fit_array *array, uint8_t sensor_count, con
  * that the fixed-point kernels are compiled for. Any other is FT_ERR_ARGUMENT too. Use it with fit_gaussian_grid. */
 enum ft_status fit_array_init_grid(struct fit_array *array, uint8_t sensor_count, const float *x_mm, const float *y_mm, float pitch_mm);
 
-/* A second fit leaves out a sensor whose reading does not belong to the others' (fit_limits.h). SENSOR_MASKED and `used` show it. The fit
- * searches for one only where residuals are rough, and more than noise, gains and model explain.
- *
- * Widths and ELONGATED need every sensor of the grid.
+/* Where residuals are rough, and larger than noise, gains and model explain, the fit searches for an outlier (fit_limits.h) and fits again
+ * without it: SENSOR_MASKED and `used` report it. Widths and ELONGATED need every sensor of the grid.
  *
  * pressure_Pa_q10[sensor]: pressure on the pad, 1/1024 Pa, any bits. usable: bitmap of the sensors to use. With fewer
  * than four (of an array on a line, three), or no positive reading, FIT_VALID stays off. */
@@ -42,11 +39,11 @@ void fit_gaussian(const struct fit_array *array, const int32_t *pressure_Pa_q10,
 void fit_gaussian_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
                        const struct fit_settings *settings, struct fit_result *result);
 
-/* fit_gaussian and fit_gaussian_grid for frames that follow each other. */
-void fit_gaussian_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
-                         const struct fit_settings *settings, struct fit_watch *watch, struct fit_result *result);
-void fit_gaussian_grid_follow(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
-                              const struct fit_settings *settings, struct fit_watch *watch, struct fit_result *result);
+/* The same for consecutive frames, with the state of the search for an outlier. */
+void fit_gaussian_update(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
+                         const struct fit_settings *settings, struct fit_outlier_state *outliers, struct fit_result *result);
+void fit_gaussian_grid_update(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
+                              const struct fit_settings *settings, struct fit_outlier_state *outliers, struct fit_result *result);
 
 /* fit_gaussian_grid without the search for an outlier, and also without the kernel for full rectangles: 11 kB less
  * code, 18 000 cycles more for each fit with every sensor, and neither widths nor ELONGATED. */
@@ -55,15 +52,15 @@ void fit_gaussian_grid_plain(const struct fit_array *array, const int32_t *press
 void fit_gaussian_grid_small(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable,
                              const struct fit_settings *settings, struct fit_result *result);
 
-/* sqrt((a b)^2 + (c d)^2) within 0.1 %, for standard deviations: some 800 cycles less than in soft
- * float, and the same bits everywhere. All are finite and not negative; at most 1e9. */
+/* sqrt((a b)^2 + (c d)^2) within 0.1 %, for standard deviations: some 800 cycles less than soft float takes, and the same bits everywhere.
+ * The arguments are finite, not negative, and at most 1e9. */
 float fit_quadrature(float a, float b, float c, float d);
 
 /* The kernels behind fit_gaussian, to compare them.
  *
  * fit_grid: fixed point, for a full rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS nodes (of the build, 2 to 6 each way)
  * with every sensor usable; sigma from 0.216 pitch. fit_grid_masked: the same with any sensors missing, at twice the
- * cost. It also takes a full rectangle whose width, known by the prior, is below FIT_SHAPE_LEAST pitches and has a dip.
+ * cost. It also takes a full rectangle whose width, known by the prior, is below FIT_WIDTHS_SIGMA_MIN pitches and has a dip.
  * fit_general: float32, any positions, any sensors missing; leaves an outlier out by itself. The former two return whether they have
  * settled with residuals that look like an outlier: rough, and more than noise, gains and model explain. */
 bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,

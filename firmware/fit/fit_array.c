@@ -27,7 +27,7 @@ static int32_t split(float value, int32_t *exponent) {
 static int node_at(float position, float first) {
   float steps = position - first; /* not negative but for rounding */
   int nearest = (int)(steps + 0.5f);
-  bool on_node = fabsf(steps - (float)nearest) <= ON_NODE && nearest < FIT_GRID_MAX_NODES;
+  bool on_node = fabsf(steps - (float)nearest) <= ON_NODE && nearest < FIT_GRID_MAX_SIDE;
   return on_node ? nearest : -1;
 }
 

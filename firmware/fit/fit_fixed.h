@@ -15,10 +15,10 @@ extern const int32_t fit_exp2_table[256];
 extern const uint16_t fit_log2_table[65];
 extern const uint8_t fit_bits_table[256];
 
-/* a + b, a - b and a * b modulo 2^32, for what only readings that no contact makes bring beyond 2^31. */
-FIXED_INLINE int32_t fixed_plus(int32_t a, int32_t b) { return (int32_t)((uint32_t)a + (uint32_t)b); }
-FIXED_INLINE int32_t fixed_minus(int32_t a, int32_t b) { return (int32_t)((uint32_t)a - (uint32_t)b); }
-FIXED_INLINE int32_t fixed_times(int32_t a, int32_t b) { return (int32_t)((uint32_t)a * (uint32_t)b); }
+/* a + b, a - b and a * b modulo 2^32. Only readings that no contact makes overflow here. */
+FIXED_INLINE int32_t wrap_add(int32_t a, int32_t b) { return (int32_t)((uint32_t)a + (uint32_t)b); }
+FIXED_INLINE int32_t wrap_sub(int32_t a, int32_t b) { return (int32_t)((uint32_t)a - (uint32_t)b); }
+FIXED_INLINE int32_t wrap_mul(int32_t a, int32_t b) { return (int32_t)((uint32_t)a * (uint32_t)b); }
 
 /* a * b / 2^32 for |a|, |b| <= 2^30, error below 2 units: three 16-bit products. */
 FIXED_INLINE int32_t fixed_mul_q32(int32_t a, int32_t b) {
@@ -56,7 +56,7 @@ FIXED_INLINE int32_t fixed_mul_near_q28(int32_t a, int32_t b) {
 }
 
 /* a * b / 2^16 for any a and |b| < 2^15; an int32_t for any b. */
-FIXED_INLINE int32_t fixed_mul_16(int32_t a, int32_t b) { return fixed_plus(fixed_times(a >> 16, b), fixed_times((uint16_t)a, b) >> 16); }
+FIXED_INLINE int32_t fixed_mul_16(int32_t a, int32_t b) { return wrap_add(wrap_mul(a >> 16, b), wrap_mul((uint16_t)a, b) >> 16); }
 
 /* Position of the highest set bit plus one; 0 for 0. */
 FIXED_INLINE int32_t fixed_bits(uint32_t value) {
@@ -72,50 +72,49 @@ FIXED_INLINE int32_t fixed_bits(uint32_t value) {
   return count + fit_bits_table[value];
 }
 
-/* |value| without its last unit for negative ones: good for judging sizes. */
-FIXED_INLINE uint32_t fixed_size(int32_t value) { return (uint32_t)(value ^ (value >> 31)); }
+/* |value|, one less for negative values: for comparing sizes. */
+FIXED_INLINE uint32_t fixed_magnitude(int32_t value) { return (uint32_t)(value ^ (value >> 31)); }
 
 FIXED_INLINE int32_t fixed_clamp(int32_t value, int32_t low, int32_t high) { return value < low ? low : value > high ? high : value; }
 
 /* sqrt(a^2 + b^2) within 7 %, for weights. */
-FIXED_INLINE int32_t fixed_longer_leg(int32_t a, int32_t b) {
+FIXED_INLINE int32_t fixed_hypot(int32_t a, int32_t b) {
   int32_t longer = a > b ? a : b, shorter = a > b ? b : a;
   return longer + ((3 * shorter) >> 3);
 }
 
-/* What is left of unknown j of a least squares once those before have been taken from it; of no
- * use below FIXED_PIVOT_LEAST, where the readings do not separate it from them. */
+/* Unknown j of a least squares after elimination of those before it. Below FIXED_PIVOT_MIN the readings do not separate it from them. */
 struct fixed_pivot {
-  int32_t half;        /* the element on the diagonal is 2^28 to 2^30 over 2^(2 half) */
-  int32_t inverse_q14; /* of that element, 2^28 to 1; 0: not determined */
-  int32_t own, over;   /* right-hand side, Q15, and over the element, Q14 */
+  int32_t half;          /* the element on the diagonal is 2^28 to 2^30 over 2^(2 half) */
+  int32_t inverse_q14;   /* of that element, 2^28 to 1; 0: not determined */
+  int32_t rhs, quotient; /* right-hand side, Q15, and the quotient of it and the element, Q14 */
 };
-#define FIXED_PIVOT_LEAST (1 << 18) /* 2^-12 */
+#define FIXED_PIVOT_MIN (1 << 18) /* 2^-12 */
 
 /* Takes from the unknowns after j what j explains: L D L^T with a power of two between the factors, of 16 bits each.
- * matrix: the lower half, rows of `words`; column j and right[j] stay as they are. over: the elements of L below j,
- * Q14. What j explains of the square of the residual is own over 2. */
-FIXED_INLINE struct fixed_pivot fixed_eliminate(int32_t *matrix, int words, int count, int j, int32_t *right, int32_t *over) {
+ * matrix: the lower half, rows of `words`; column j and right[j] stay as they are. factor: the elements of L below j,
+ * Q14. What j explains of the square of the residual is 2 rhs quotient. */
+FIXED_INLINE struct fixed_pivot fixed_eliminate(int32_t *matrix, int words, int count, int j, int32_t *right, int32_t *factor) {
   struct fixed_pivot pivot = {0, 0, 0, 0};
   int32_t element = matrix[j * words + j];
-  if (element < FIXED_PIVOT_LEAST) {
+  if (element < FIXED_PIVOT_MIN) {
     for (int i = j + 1; i < count; i++) {
-      over[i] = 0;
+      factor[i] = 0;
     }
     return pivot;
   }
   pivot.half = element >> 30 ? 0 : (30 - fixed_bits((uint32_t)element)) >> 1;
   int32_t down = 15 - pivot.half, round = 1 << down >> 1;
   pivot.inverse_q14 = port_divide((1 << 29) - 1, (element * (1 << (2 * pivot.half))) >> 15);
-  pivot.own = fixed_clamp(fixed_plus(right[j], round) >> down, -(1 << 15), 1 << 15);
-  pivot.over = fixed_plus(fixed_times(pivot.own, pivot.inverse_q14), 1 << 14) >> 15;
+  pivot.rhs = fixed_clamp(wrap_add(right[j], round) >> down, -(1 << 15), 1 << 15);
+  pivot.quotient = wrap_add(wrap_mul(pivot.rhs, pivot.inverse_q14), 1 << 14) >> 15;
   for (int i = j + 1; i < count; i++) {
     int32_t *row = matrix + i * words;
-    int32_t twice = fixed_clamp(fixed_plus(row[j], round) >> down, -(1 << 15), 1 << 15) * 2; /* Q16 */
-    over[i] = fixed_plus(fixed_times(twice, pivot.inverse_q14), 1 << 15) >> 16;
-    right[i] = fixed_minus(right[i], fixed_times(twice, pivot.over));
+    int32_t twice = fixed_clamp(wrap_add(row[j], round) >> down, -(1 << 15), 1 << 15) * 2; /* Q16 */
+    factor[i] = wrap_add(wrap_mul(twice, pivot.inverse_q14), 1 << 15) >> 16;
+    right[i] = wrap_sub(right[i], wrap_mul(twice, pivot.quotient));
     for (int k = j + 1; k <= i; k++) {
-      row[k] = fixed_minus(row[k], fixed_times(twice, over[k]));
+      row[k] = wrap_sub(row[k], wrap_mul(twice, factor[k]));
     }
   }
   return pivot;
@@ -144,7 +143,7 @@ FIXED_INLINE struct scaled scaled_unpack(uint64_t packed) {
 }
 
 FIXED_INLINE struct scaled scaled_from(int32_t value, int32_t exponent) {
-  int32_t shift = fixed_bits(fixed_size(value) | 1) - 15;
+  int32_t shift = fixed_bits(fixed_magnitude(value) | 1) - 15;
   struct scaled result = {shift >= 0 ? value >> shift : value * (1 << -shift), exponent + shift};
   return result;
 }
@@ -216,7 +215,7 @@ FIXED_INLINE struct scaled scaled_sqrt(struct scaled a) {
 }
 
 /* 15-bit mantissa from one of up to 31 bits. */
-FIXED_INLINE struct scaled short_of(struct scaled a) { return scaled_from(a.mantissa, a.exponent); }
+FIXED_INLINE struct scaled scaled_short(struct scaled a) { return scaled_from(a.mantissa, a.exponent); }
 
 /* value * 2^shift, saturated to +-2^30. */
 FIXED_INLINE int32_t shifted(int32_t value, int32_t shift) {

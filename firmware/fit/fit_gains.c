@@ -6,17 +6,17 @@
 #include <math.h>
 
 #define SHARE_PER_CUBE 0.58f
-#define WIDTH_LEAST 0.55f /* pitches */
-#define WIDTH_MOST 1.0f
+#define WIDTH_MIN 0.55f /* pitches */
+#define WIDTH_MAX 1.0f
 #define WIDTH_USUAL 0.6f  /* of the touches that the assumed value counts for */
 #define REST_SHARE 0.02f  /* of p0 */
 #define NOISE_SHARE 0.05f /* of what remains, at most */
 #define VARIANCE_USUAL 0.01f
-#define TIMES_MOST 8.0f /* of these or what is learnt: one odd touch shows little */
-#define SD_LEAST 0.08f
-#define SD_MOST 0.5f
+#define TOUCH_FACTOR_MAX 8.0f /* of these or what is learnt: one odd touch shows little */
+#define SD_MIN 0.08f
+#define SD_MAX 0.5f
 #define PARAMETERS 4
-#define SENSORS_LEAST 9
+#define SENSORS_MIN 9
 #define READING_BITS 13 /* so that the squares of all FT_MAX_SENSORS fit into 32 bits */
 _Static_assert(FT_MAX_SENSORS <= 1 << (32 - 2 * READING_BITS), "sum of squares");
 
@@ -46,7 +46,7 @@ void fit_gains_begin(struct fit_gains *gains, float gain_sd) {
   gains->residual = gains->share * gain_sd * gain_sd;
 }
 
-void fit_gains_lift(struct fit_gains *gains) {
+void fit_gains_end_touch(struct fit_gains *gains) {
   gains->p0_Pa = 0.0f;
   gains->counted = false;
 }
@@ -57,9 +57,9 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array, con
   const float p0_Pa = result->p0_Pa, width = result->sigma_mm / array->pitch_mm;
   const bool rests = fabsf(p0_Pa - gains->p0_Pa) <= REST_SHARE * p0_Pa;
   gains->p0_Pa = p0_Pa;
-  if (gains->counted || !rests || array->is_line || count < SENSORS_LEAST || !(result->flags & CONTACT_FLAG_FIT_VALID) ||
-      (result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT)) || result->used != first_sensors(count) || width < WIDTH_LEAST ||
-      width > WIDTH_MOST) {
+  if (gains->counted || !rests || array->is_line || count < SENSORS_MIN || !(result->flags & CONTACT_FLAG_FIT_VALID) ||
+      (result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT)) || result->used != first_sensors(count) || width < WIDTH_MIN ||
+      width > WIDTH_MAX) {
     return false;
   }
   float largest_Pa;
@@ -71,7 +71,7 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array, con
   const float freedom = (float)(count - PARAMETERS);
   const float noise = freedom * noise_Pa * noise_Pa;
   const float learnt = gains->residual / gains->share;
-  const float most = TIMES_MOST * share * (learnt > VARIANCE_USUAL ? learnt : VARIANCE_USUAL);
+  const float most = TOUCH_FACTOR_MAX * share * (learnt > VARIANCE_USUAL ? learnt : VARIANCE_USUAL);
   if (!(noise < NOISE_SHARE * share * learnt * fitted)) {
     return false;
   }
@@ -79,7 +79,7 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array, con
   gains->residual += residual < most ? residual : most;
   gains->share += share;
   gains->counted = true;
-  const float remembered = FIT_GAINS_TOUCHES_MOST * share_of(WIDTH_USUAL);
+  const float remembered = FIT_GAINS_TOUCHES_MAX * share_of(WIDTH_USUAL);
   if (gains->share > remembered) {
     gains->residual *= remembered / gains->share;
     gains->share = remembered;
@@ -89,5 +89,5 @@ bool fit_gains_learn(struct fit_gains *gains, const struct fit_array *array, con
 
 float fit_gains_sd(const struct fit_gains *gains) {
   const float variance = gains->residual / gains->share;
-  return variance <= SD_LEAST * SD_LEAST ? SD_LEAST : variance >= SD_MOST * SD_MOST ? SD_MOST : sqrtf(variance);
+  return variance <= SD_MIN * SD_MIN ? SD_MIN : variance >= SD_MAX * SD_MAX ? SD_MAX : sqrtf(variance);
 }

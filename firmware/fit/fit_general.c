@@ -11,8 +11,7 @@
 #define LOG2_E 1.44269504f
 #define TWO_PI 6.28318531f
 
-/* Readings below this share of the largest, or this many standard deviations of the noise, carry
- * more noise than shape into the logarithm. */
+/* Readings below this share of the largest, or this number of noise standard deviations, have more noise than shape in their logarithm. */
 #define GUESS_SHARE 0.01f
 #define GUESS_NOISES 5.0f
 /* Prior of the guess alone, which decides where too few readings are large. */
@@ -24,10 +23,10 @@
 #define WIDEN_LIMIT 0.5f
 /* Pitches by which an iterate may leave the box that the result is held to, for the same reason. */
 #define OVERSHOOT 0.25f
-#define P0_MIN 0.05f         /* of the largest reading */
-#define P0_MAX 1e6f          /* reached 30 mm outside the array */
-#define LEAST_FREE 0.015625f /* 1 - leverage, in a studentised residual */
-#define PIVOT_FLOOR 2e-7f    /* of the diagonal entry: float32 resolves no less */
+#define P0_MIN 0.05f       /* of the largest reading */
+#define P0_MAX 1e6f        /* reached 30 mm outside the array */
+#define FREE_MIN 0.015625f /* 1 - leverage, in a studentised residual */
+#define PIVOT_FLOOR 2e-7f  /* of the diagonal entry: float32 resolves no less */
 
 /* Symmetric 4 x 4 and right-hand side. matrix[i][j] for j <= i. */
 struct normal_equations {
@@ -50,8 +49,8 @@ struct parameters {
 
 /* What cast rubber takes from the Gaussian e: share exp(-(X^2 + Y^2) / (2 sd^2)), of the same amplitude. */
 struct dip {
-  float share, log2_scale, narrowness; /* log2(e) / (2 sd^2), 1 / sd^2 */
-  const struct fit_array *ends;        /* of the pad, where the dip is less; NULL: nowhere */
+  float share, log2_scale, inverse_variance; /* log2(e) / (2 sd^2), 1 / sd^2 */
+  const struct fit_array *ends;              /* of the pad, where the dip is less; NULL: nowhere */
 };
 
 /* One more row weight (sigma - prior) of the least squares, pitches; weight 0: none. */
@@ -183,8 +182,8 @@ static float model_row(const struct dip *dip, const struct parameters *at, float
   float r2 = x * x + y * y, sigma2 = at->sigma * at->sigma;
   float e = fit_exp2_negative(r2 * (0.5f * LOG2_E / sigma2));
   float d = dip->share > 0.0f ? dip->share * fit_exp2_negative(r2 * dip->log2_scale) : 0.0f;
-  d = dip->ends ? d * fit_dip_there(dip->ends, at->x, at->y, place_x, place_y) : d;
-  float slope = e - sigma2 * dip->narrowness * d;
+  d = dip->ends ? d * fit_dip_share(dip->ends, at->x, at->y, place_x, place_y) : d;
+  float slope = e - sigma2 * dip->inverse_variance * d;
   row[0] = e - d;
   row[1] = slope * x;
   row[2] = slope * y;
@@ -192,8 +191,7 @@ static float model_row(const struct dip *dip, const struct parameters *at, float
   return d;
 }
 
-/* Gives theta the best amplitude for its shape, p0 entering linearly, and sets up the normal
- * equations of the model linearised there. Returns the sum of squared residuals. */
+/* Sets the best amplitude for the shape of theta, and the normal equations linearised there. Returns the sum of squared residuals. */
 static float linearise(const struct fit_array *array, const struct samples *samples, struct prior prior, const struct dip *dip,
                        struct parameters *theta, struct normal_equations *normal) {
   memset(normal, 0, sizeof *normal);
@@ -265,8 +263,7 @@ static int32_t largest_reading(const struct fit_array *array, const int32_t *pre
   return largest;
 }
 
-/* The sensor whose reading does not belong to the others', or -1. theta and the factors are those
- * of the last linearisation, squares its sum of squared residuals. */
+/* The outlier among the sensors, or -1. theta, the factors and squares, the sum of squared residuals, are of the last linearisation. */
 static int outlier_of(const struct samples *samples, const struct dip *dip, const struct parameters *theta,
                       const struct normal_equations *normal, float squares, int unknowns) {
   float worst = 0.0f, second = 0.0f;
@@ -276,7 +273,7 @@ static int outlier_of(const struct samples *samples, const struct dip *dip, cons
     model_row(dip, theta, samples->x[k], samples->y[k], row);
     float residual = samples->p[k] - theta->p0 * row[0];
     float free = 1.0f - inverse_form(normal, row); /* of the leverage */
-    float without = residual * residual / (free > LEAST_FREE ? free : LEAST_FREE);
+    float without = residual * residual / (free > FREE_MIN ? free : FREE_MIN);
     if (without > worst) {
       second = worst;
       worst = without;
@@ -291,8 +288,7 @@ static int outlier_of(const struct samples *samples, const struct dip *dip, cons
   return alone && others * (float)(FIT_OUTLIER * FIT_OUTLIER) < worst * freedom ? outlier : -1;
 }
 
-/* Pitches, and shares of the force, by which a unit of the right-hand side moves the result; and
- * what of these an error of variance 1 of every reading makes. */
+/* How far a unit of the right-hand side moves the result, in pitches and shares of the force; variances where every reading has 1. */
 struct influence {
   float gain; /* sigma^2 / p0 */
   float x[PARAMETERS], y[PARAMETERS], force[PARAMETERS];
@@ -337,16 +333,16 @@ static void set_influence(const struct fit_array *array, const struct parameters
 }
 
 /* Variances that the sensors' own errors make; fit_limits.h has the errors. */
-struct own_errors {
+struct sensor_errors {
   float gains;           /* sum of the squared errors of the readings */
   float location, force; /* pitches squared, and share squared */
 };
 
-static void add_own_errors(const struct samples *samples, const struct fit_settings *settings, float scale, const struct dip *dip,
-                           const struct parameters *at, const struct influence *influence, struct own_errors *own) {
+static void add_sensor_errors(const struct samples *samples, const struct fit_settings *settings, float scale, const struct dip *dip,
+                              const struct parameters *at, const struct influence *influence, struct sensor_errors *errors) {
   float inverse = 1.0f / (at->sigma * at->sigma);
   float shape_x = 0.0f, shape_y = 0.0f, shape_force = 0.0f;
-  own->gains = own->location = own->force = 0.0f;
+  errors->gains = errors->location = errors->force = 0.0f;
   for (int k = 0; k < samples->count; k++) {
     float x = samples->x[k] - at->x, y = samples->y[k] - at->y;
     float r2 = x * x + y * y;
@@ -358,9 +354,9 @@ static void add_own_errors(const struct samples *samples, const struct fit_setti
     float past_sd = scale * (float)settings->past_sd_Pa_q10[samples->sensor[k]];
     float error = at->p0 * (gain_sd * e + FIT_DIP_ERROR * d);
     float variance = error * error + past_sd * past_sd;
-    own->gains += variance;
-    own->location += (by_x * by_x + by_y * by_y) * variance;
-    own->force += by_force * by_force * variance;
+    errors->gains += variance;
+    errors->location += (by_x * by_x + by_y * by_y) * variance;
+    errors->force += by_force * by_force * variance;
     float shape = e * (r2 * inverse) * (r2 * inverse);
     shape_x += by_x * shape;
     shape_y += by_y * shape;
@@ -372,21 +368,21 @@ static void add_own_errors(const struct samples *samples, const struct fit_setti
     strength *= FIT_SHAPE_KNOWN;
   }
   strength *= usual * at->p0;
-  own->location += (shape_x * shape_x + shape_y * shape_y) * strength * strength;
-  own->force += shape_force * shape_force * strength * strength;
+  errors->location += (shape_x * shape_x + shape_y * shape_y) * strength * strength;
+  errors->force += shape_force * shape_force * strength * strength;
 }
 
-/* As fit_grid_take_own_out. */
-static void take_own_out(const struct fit_own *own, const struct parameters *at, struct samples *samples) {
+/* As fit_grid_remove_deviations. */
+static void remove_deviations(const struct fit_deviation *deviations, const struct parameters *at, struct samples *samples) {
   const float inverse = 1.0f / (at->sigma * at->sigma);
   for (int k = 0; k < samples->count; k++) {
-    const struct fit_own *one = &own[samples->sensor[k]];
+    const struct fit_deviation *deviation = &deviations[samples->sensor[k]];
     float x = samples->x[k] - at->x, y = samples->y[k] - at->y;
-    float wider = (1.0f / 32768.0f) * (float)one->wider_q15;
-    float along_x = wider * x - (1.0f / 32768.0f) * (float)one->off_x_q15;
-    float along_y = wider * y - (1.0f / 32768.0f) * (float)one->off_y_q15;
+    float wider = (1.0f / 32768.0f) * (float)deviation->wider_q15;
+    float along_x = wider * x - (1.0f / 32768.0f) * (float)deviation->off_x_q15;
+    float along_y = wider * y - (1.0f / 32768.0f) * (float)deviation->off_y_q15;
     float share = inverse * (along_x * x + along_y * y);
-    share = clamp(share, -FIT_OWN_SHARE_MAX, FIT_OWN_SHARE_MAX);
+    share = clamp(share, -FIT_DEVIATION_SHARE_MAX, FIT_DEVIATION_SHARE_MAX);
     float e = fit_exp2_negative((x * x + y * y) * (0.5f * LOG2_E * inverse));
     samples->p[k] -= at->p0 * e * share;
   }
@@ -451,12 +447,12 @@ static void set_known(struct problem *problem) {
     problem->prior.sigma = settings->prior_sigma_mm / pitch_mm;
     problem->prior.weight = FIT_PRIOR_WEIGHT * pitch_mm / settings->prior_width_mm;
   }
-  problem->dip = (struct dip){0.0f, 0.0f, 0.0f, fit_steps_want_dip(problem->array, settings) ? problem->array : NULL};
+  problem->dip = (struct dip){0.0f, 0.0f, 0.0f, fit_jacobian_needs_dip(problem->array, settings) ? problem->array : NULL};
   if (fit_has_dip(settings)) {
     float sd = clamp(settings->dip_sd_mm / pitch_mm, FIT_DIP_SD_MIN, FIT_DIP_SD_MAX);
     problem->dip.share = settings->dip_share;
-    problem->dip.narrowness = 1.0f / (sd * sd);
-    problem->dip.log2_scale = 0.5f * LOG2_E * problem->dip.narrowness;
+    problem->dip.inverse_variance = 1.0f / (sd * sd);
+    problem->dip.log2_scale = 0.5f * LOG2_E * problem->dip.inverse_variance;
   }
 }
 
@@ -467,8 +463,8 @@ static void iterate(struct problem *problem, struct solution *solution) {
   *theta = guess(&problem->samples, problem->peak);
   int left = settings->iterations;
   do {
-    if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
-      take_own_out(settings->own, theta, &problem->samples);
+    if (fit_has_deviations(settings) && left == FIT_DEVIATION_ITERATIONS) {
+      remove_deviations(settings->deviations, theta, &problem->samples);
     }
     solution->squares = linearise(array, &problem->samples, problem->prior, &problem->dip, theta, &solution->normal);
     solution->before = *theta;
@@ -514,8 +510,8 @@ static uint32_t flags_of(const struct problem *problem, const struct solution *s
   return flags;
 }
 
-/* Sets the standard deviations, from the last linearisation: a variance of the readings that is the same for all of them, and what their
- * own errors make of the result; that of the prior is its own. Returns whether noise, gains and model do not explain the residuals. */
+/* Sets the standard deviations by the last linearisation: from a variance that all readings share, the errors of each sensor, and the
+ * prior. Returns whether the residuals are larger than noise, gains and model explain. */
 static bool set_errors(const struct problem *problem, const struct solution *solution, uint32_t flags, struct fit_result *result) {
   const struct fit_settings *settings = problem->settings;
   const struct parameters *before = &solution->before;
@@ -523,20 +519,20 @@ static bool set_errors(const struct problem *problem, const struct solution *sol
   const float pitch = problem->array->pitch_mm;
   struct influence influence;
   set_influence(problem->array, before, &solution->normal, &influence);
-  struct own_errors own;
-  add_own_errors(&problem->samples, settings, problem->scale, &problem->dip, before, &influence, &own);
+  struct sensor_errors errors;
+  add_sensor_errors(&problem->samples, settings, problem->scale, &problem->dip, before, &influence, &errors);
   int freedom = count > problem->unknowns ? count - problem->unknowns : 1;
   float noise = (float)settings->noise_Pa_q10 * problem->scale;
   float model = (float)settings->model_sd_q16 * (1.0f / 65536.0f);
   float variance = noise * noise + model * model;
-  float expected = variance + own.gains / (float)count;
+  float expected = variance + errors.gains / (float)count;
   float found = solution->squares / (float)freedom;
   if (found > expected) {
-    float times = clamp(found / expected * (1.0f / FIT_MISFIT_BEGIN), 1.0f, FIT_MISFIT_MOST);
+    float times = clamp(found / expected * (1.0f / FIT_MISFIT_BEGIN), 1.0f, FIT_MISFIT_MAX);
     variance += times * (found - expected);
   }
-  float location_variance = variance * influence.location_form + own.location;
-  float force_variance = variance * influence.force_form + own.force;
+  float location_variance = variance * influence.location_form + errors.location;
+  float force_variance = variance * influence.force_form + errors.force;
   float prior_excess = FIT_PRIOR_WEIGHT * FIT_PRIOR_WEIGHT - variance;
   if (problem->prior.weight > 0.0f && prior_excess > 0.0f) {
     float row[PARAMETERS] = {0.0f, 0.0f, 0.0f, problem->prior.weight * before->sigma * influence.gain};
@@ -555,8 +551,7 @@ static bool set_errors(const struct problem *problem, const struct solution *sol
   return found > (float)(FIT_MISFIT * FIT_MISFIT) * expected;
 }
 
-/* Whether the fit has settled with residuals that are rough and no noise; then outlier is the
- * sensor that does not belong to the others, or -1. */
+/* Returns whether the fit has settled with residuals that are rough and no noise. Then outlier is that sensor, or -1. */
 static bool fit_once(const struct fit_array *array, const int32_t *pressure_Pa_q10, sensor_map usable, const struct fit_settings *settings,
                      struct fit_result *result, int *outlier) {
   memset(result, 0, sizeof *result);
@@ -611,7 +606,7 @@ void fit_general(const struct fit_array *array, const int32_t *pressure_Pa_q10, 
   struct fit_result without;
   usable &= ~sensor_bit((unsigned)outlier);
   bool rough = fit_once(array, pressure_Pa_q10, usable, settings, &without, &outlier);
-  if (fit_outlier_gone(settings, result, &without, rough, array->pitch_mm)) {
+  if (fit_is_better_without(settings, result, &without, rough, array->pitch_mm)) {
     *result = without;
   }
 }

@@ -15,24 +15,23 @@
 
 #define UNROLL _Pragma("GCC unroll 6") /* for loops over the nodes of an axis */
 
-/* A sum against the basis is at most the sum of |value| times |g| <= 2^14 and |p| <= 2^15, of which
- * 16 bits are dropped: with the former below 2^17 no sum leaves 32 bits. */
+/* A sum against the basis is at most sum |value| times |g| <= 2^14 and |p| <= 2^15, less 16 bits: it fits if sum |value| is below 2^17. */
 #define RESIDUAL_SUM_BITS 17
 
-/* The first iterations project the readings themselves, since the basis is orthogonal to the model.
- * Their rounding would let them wander along the valleys of badly conditioned presses, so they are few. */
+/* The first iterations project the readings, since the basis is orthogonal to the model. They are few, because rounding would let them
+ * wander along the valleys of badly conditioned presses. */
 #define COARSE_ITERATIONS 3
 #define FINE_ITERATIONS 2
 
-/* Guess alone: readings below a share of the largest carry more noise than shape into a logarithm;
- * a ridge towards sigma 0.45 pitch decides where too few are large. */
+/* First guess: smaller readings have more noise than shape in their logarithm; a ridge towards sigma 0.45 pitch decides where few remain.
+ */
 #define GUESS_SHARE_Q30 85899346                         /* 8 % of the largest marginal */
 #define GUESS_RIDGE ((struct scaled){25166, -23})        /* 0.003 */
 #define GUESS_RIDGE_HEIGHT ((struct scaled){22410, -21}) /* 0.003 * log2(e) / (2 * 0.45^2) */
 #define GUESS_HEIGHT_MIN_Q26 1936353
 #define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
 
-/* FIT_STRETCH_LEAST^2, FIT_STRETCH_SURE^2, FIT_STRETCH_SD_MAX^2, FIT_STRETCH_LINEAR^2, and the height of FIT_SHAPE_LEAST. */
+/* FIT_ELONGATION_ MIN^2, SDS^2, SD_MAX^2 and LINEAR^2, and the curvature of FIT_WIDTHS_SIGMA_MIN. */
 #define ROUND_SQUARE ((struct scaled){20972, -21})
 #define SURE_SQUARE ((struct scaled){25600, -12})
 #define KNOWN_SQUARE ((struct scaled){16384, -18})
@@ -40,13 +39,12 @@
 #define SHAPE_HEIGHT_MAX_Q26 160029133
 #define TAIL_ERROR ((struct scaled){31457, -21}) /* FIT_TAIL_ERROR */
 
-/* One factor of the separable Gaussian, and the polynomials that are orthogonal under its square.
- * p1 = k - mean and p2 = k^2 - k slope + constant, k the node number. */
+/* One factor of the Gaussian, and the polynomials orthogonal under its square: p1 = k - mean, p2 = k^2 - k slope + constant, k the node. */
 struct factor {
-  int32_t g[MOST_ALONG];      /* Q30, 1 at the nearest node */
-  int32_t g_q14[MOST_ALONG];  /* the same */
-  int32_t linear[MOST_ALONG]; /* g p1, |.| <= 2^15, value = integer * 2^-linear_q */
-  int32_t square[MOST_ALONG]; /* g p2, |.| <= 2^15, value = integer * 2^-square_q */
+  int32_t g[MAX_SIDE];      /* Q30, 1 at the nearest node */
+  int32_t g_q14[MAX_SIDE];  /* the same */
+  int32_t linear[MAX_SIDE]; /* g p1, |.| <= 2^15, value = integer * 2^-linear_q */
+  int32_t square[MAX_SIDE]; /* g p2, |.| <= 2^15, value = integer * 2^-square_q */
   int32_t linear_q;
   int32_t mass_q26;    /* sum of g^2 */
   int32_t linear_norm; /* sum of linear^2 / 8 */
@@ -56,16 +54,15 @@ struct factor {
   int32_t offset; /* of the centre from the nearest node */
 };
 
-/* What one evaluation of the model leaves: the normal equations in the orthogonal basis. Of the
- * struct scaled here the mantissas have up to 31 bits. */
+/* The normal equations in the orthogonal basis. Mantissas of the struct scaled here have up to 31 bits. */
 struct moments {
   struct factor x, y;
   int32_t square_q; /* common to both, so that the parts of p2(x) + q2(y) add up */
   int32_t b_x, b_y; /* those parts of the right-hand side */
 };
 
-FIXED_INLINE void set_gaussian(struct factor *f, int nodes, int origin, int32_t centre, int32_t height) {
-  struct fit_exponent exponent = fit_exponent_first(nodes, origin, centre, height, &f->offset);
+FIXED_INLINE void set_gaussian(struct factor *f, int nodes, int origin, int32_t centre, int32_t curvature) {
+  struct fit_exponent exponent = fit_exponent_first(nodes, origin, centre, curvature, &f->offset);
   UNROLL for (int i = 0; i < nodes; i++) {
     f->g[i] = exp2_negative(exponent.value);
     fit_exponent_next(&exponent);
@@ -75,7 +72,7 @@ FIXED_INLINE void set_gaussian(struct factor *f, int nodes, int origin, int32_t 
 /* Largest |.| of the vector as a bit pattern: only its highest bit means anything. */
 FIXED_INLINE uint32_t vector_size(const int32_t *vector, int count) {
   uint32_t size = 1;
-  UNROLL for (int i = 0; i < count; i++) { size |= fixed_size(vector[i]); }
+  UNROLL for (int i = 0; i < count; i++) { size |= fixed_magnitude(vector[i]); }
   return size;
 }
 
@@ -90,8 +87,7 @@ FIXED_INLINE int32_t shift_to(int32_t bits, uint32_t size) {
   return shift > 0 ? shift : 0;
 }
 
-/* p1 and p2 and their values times g. Those of p2 come from additions, so that they stay accurate
- * where they nearly vanish; they are left in Q28. */
+/* p1 and p2, and these times g. Additions give the values of p2, in Q28, so that they stay accurate where they nearly vanish. */
 FIXED_INLINE void set_polynomials(struct factor *f, int nodes, int origin) {
   int32_t mass = 0, first = 0, second = 0;
   UNROLL for (int i = 0; i < nodes; i++) {
@@ -107,7 +103,7 @@ FIXED_INLINE void set_polynomials(struct factor *f, int nodes, int origin) {
   f->mean = fixed_div_q26(first, mass);
   int32_t mean_square = fixed_div_q26(second, mass);
 
-  int32_t values[MOST_ALONG];
+  int32_t values[MAX_SIDE];
   UNROLL for (int i = 0; i < nodes; i++) { values[i] = fixed_mul_q32(f->g[i], ((i - origin) * ONE_Q26 - f->mean) * 4); }
   int32_t shift = shift_to(15, vector_size(values, nodes));
   vector_shift(values, f->linear, nodes, shift);
@@ -154,8 +150,8 @@ static NOINLINE int32_t project_on_model(const struct moments *m, const int32_t 
   int32_t product = 0;
   UNROLL for (int i = 0; i < COLUMNS; i++) {
     int32_t sum = 0;
-    UNROLL for (int j = 0; j < ROWS; j++) { sum = fixed_plus(sum, fixed_times(p_q14[i * ROWS + j], y[j])); }
-    product = fixed_plus(product, fixed_mul_16(sum, x[i]) >> PRODUCT_SHIFT);
+    UNROLL for (int j = 0; j < ROWS; j++) { sum = wrap_add(sum, wrap_mul(p_q14[i * ROWS + j], y[j])); }
+    product = wrap_add(product, fixed_mul_16(sum, x[i]) >> PRODUCT_SHIFT);
   }
   return product;
 }
@@ -171,7 +167,7 @@ static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_
     UNROLL for (int j = 0; j < ROWS; j++) {
       int32_t r = p[j] - fixed_mul_q30(y->g[j], column);
       residual[j] = r;
-      sum += fixed_size(r) >> 4;
+      sum += fixed_magnitude(r) >> 4;
     }
     p += ROWS;
     residual += ROWS;
@@ -186,9 +182,9 @@ static NOINLINE int32_t set_residual(const struct moments *m, int32_t amplitude_
 }
 
 /* The sums of the values against the basis. Each part of it is g along one of the axes at least, so sums over rows and columns do. */
-static NOINLINE void project(struct moments *m, const int32_t *values, int32_t shift, struct fit_system *system) {
+static NOINLINE void project(struct moments *m, const int32_t *values, int32_t shift, struct fit_equations *equations) {
   const struct factor *x = &m->x, *y = &m->y;
-  int32_t over_y[MOST_COLUMNS] = {0};
+  int32_t over_y[MAX_COLUMNS] = {0};
   int32_t b2 = 0, b3_y = 0;
   for (int j = 0; j < ROWS; j++) {
     int32_t over_x = 0, g = y->g_q14[j];
@@ -207,54 +203,54 @@ static NOINLINE void project(struct moments *m, const int32_t *values, int32_t s
     b3_x += fixed_mul_16(over_y[i], x->square[i]);
   }
   int32_t q = shift - 26; /* values Q(28 - shift), g Q14, 16 bits dropped */
-  system->b0 = b0 >> (2 - PRODUCT_SHIFT);
-  system->b1 = (struct scaled){b1, q - x->linear_q};
-  system->b2 = (struct scaled){b2, q - y->linear_q};
-  system->b3 = (struct scaled){(b3_x >> 1) + (b3_y >> 1), q + 1 - m->square_q}; /* one bit more */
+  equations->b0 = b0 >> (2 - PRODUCT_SHIFT);
+  equations->b1 = (struct scaled){b1, q - x->linear_q};
+  equations->b2 = (struct scaled){b2, q - y->linear_q};
+  equations->b3 = (struct scaled){(b3_x >> 1) + (b3_y >> 1), q + 1 - m->square_q}; /* one bit more */
   m->b_x = b3_x;
   m->b_y = b3_y;
 }
 
-FIXED_INLINE void evaluate(struct readings *readings, bool coarse, struct moments *m, struct fit_system *system) {
-  const struct state *at = &system->at;
-  set_gaussian(&m->x, COLUMNS, COLUMNS / 2, at->x, at->height);
-  set_gaussian(&m->y, ROWS, ROWS / 2, at->y, at->height);
+FIXED_INLINE void evaluate(struct readings *readings, bool coarse, struct moments *m, struct fit_equations *equations) {
+  const struct state *at = &equations->at;
+  set_gaussian(&m->x, COLUMNS, COLUMNS / 2, at->x, at->curvature);
+  set_gaussian(&m->y, ROWS, ROWS / 2, at->y, at->curvature);
   orthogonalise(m);
   int32_t mass = fixed_mul_q32(m->x.mass_q26, m->y.mass_q26) >> (6 + PRODUCT_SHIFT);
   if (coarse) {
-    project(m, readings->q14, 14, system);
-    system->amplitude_q28 = fit_grid_amplitude(system->b0 * (4 >> PRODUCT_SHIFT), mass, false);
+    project(m, readings->q14, 14, equations);
+    equations->amplitude_q28 = fit_grid_amplitude(equations->b0 * (4 >> PRODUCT_SHIFT), mass, false);
   } else {
     int32_t product = project_on_model(m, readings->q14);
-    system->amplitude_q28 = fit_grid_amplitude(product, mass, true);
-    system->residual_shift = set_residual(m, system->amplitude_q28, readings);
-    project(m, readings->residual, system->residual_shift, system);
+    equations->amplitude_q28 = fit_grid_amplitude(product, mass, true);
+    equations->residual_shift = set_residual(m, equations->amplitude_q28, readings);
+    project(m, readings->residual, equations->residual_shift, equations);
   }
-  system->slope_x = m->x.slope;
-  system->slope_y = m->y.slope;
+  equations->slope_x = m->x.slope;
+  equations->slope_y = m->y.slope;
   int32_t mass_x = m->x.mass_q26 >> 14, mass_y = m->y.mass_q26 >> 14;
-  system->d1 = (struct scaled){(m->x.linear_norm >> 14) * mass_y, 5 - 2 * m->x.linear_q};
-  system->d2 = (struct scaled){(m->y.linear_norm >> 14) * mass_x, 5 - 2 * m->y.linear_q};
-  system->d3 = (struct scaled){(m->x.square_norm >> 15) * mass_y + (m->y.square_norm >> 15) * mass_x, 6 - 2 * m->square_q};
-  fit_grid_complete(readings, system);
+  equations->d1 = (struct scaled){(m->x.linear_norm >> 14) * mass_y, 5 - 2 * m->x.linear_q};
+  equations->d2 = (struct scaled){(m->y.linear_norm >> 14) * mass_x, 5 - 2 * m->y.linear_q};
+  equations->d3 = (struct scaled){(m->x.square_norm >> 15) * mass_y + (m->y.square_norm >> 15) * mass_x, 6 - 2 * m->square_q};
+  fit_grid_complete(readings, equations);
 }
 
-/* What the result needs besides the system of the last iteration. */
-static NOINLINE void finish(const struct readings *readings, const struct moments *m, struct fit_system *system) {
-  const struct state *at = &system->at;
+/* What the result needs besides the equations of the last iteration. */
+static NOINLINE void finish(const struct readings *readings, const struct moments *m, struct fit_equations *equations) {
+  const struct state *at = &equations->at;
   int32_t x = fixed_mul_q26(at->x, at->x - m->x.slope) + m->x.constant;
   int32_t y = fixed_mul_q26(at->y, at->y - m->y.slope) + m->y.constant;
-  system->bend_q24 = (x >> 2) + (y >> 2);
-  system->mean_x = m->x.mean;
-  system->mean_y = m->y.mean;
-  system->mass_q20 = fixed_mul_q32(m->x.mass_q26, m->y.mass_q26);
-  system->rise_q22 = fit_grid_rise(at->height, m->x.offset, m->y.offset);
+  equations->p3_centre_q24 = (x >> 2) + (y >> 2);
+  equations->mean_x = m->x.mean;
+  equations->mean_y = m->y.mean;
+  equations->mass_q20 = fixed_mul_q32(m->x.mass_q26, m->y.mass_q26);
+  equations->rise_q22 = fit_grid_rise(at->curvature, m->x.offset, m->y.offset);
   int32_t squares = 0;
   UNROLL for (int k = 0; k < NODES; k++) {
     int32_t r = readings->residual[k] >> 2;
     squares += r * r;
   }
-  system->square_sum = (struct scaled){squares, 4 + 2 * (system->residual_shift - 28)};
+  equations->square_sum = (struct scaled){squares, 4 + 2 * (equations->residual_shift - 28)};
 }
 
 /* How far the contact is from round. Widths that differ, e p2(x) and e q2(y) with signs of their
@@ -265,7 +261,7 @@ struct shape {
   struct scaled wider_x, wider_y, stretch, slant; /* wider: log of sigma_x / sigma, sigma_y / sigma */
   struct scaled noise_form;                       /* by which the readings' variance gives that of (length of both)^2 / 2 */
   int32_t x, y, xy, exponent;                     /* how one unit of each column moves that square, halved */
-  uint32_t by_gains;                              /* sum over the sensors, as in struct fit_spread */
+  uint32_t by_gains;                              /* sum over the sensors, as in struct fit_propagation */
 };
 
 /* The sum of the residual against e p1(x) q1(y). */
@@ -281,8 +277,8 @@ static struct scaled project_slant(const struct moments *m, const struct reading
   return fit_scaled_from(sum, 17 + residual_shift - 28 - m->x.linear_q - m->y.linear_q);
 }
 
-static NOINLINE void begin_shape(const struct readings *readings, const struct moments *m, const struct fit_system *system,
-                                 const struct fit_spread *spread, struct shape *shape) {
+static NOINLINE void begin_shape(const struct readings *readings, const struct moments *m, const struct fit_equations *equations,
+                                 const struct fit_propagation *propagation, struct shape *shape) {
   const struct factor *x = &m->x, *y = &m->y;
   struct scaled mass_x = fit_scaled_from(x->mass_q26, -26), mass_y = fit_scaled_from(y->mass_q26, -26);
   int32_t norm_q = 3 - 2 * m->square_q;
@@ -290,20 +286,20 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
   struct scaled inverse_y = fit_grid_reciprocal(scaled_mul(fit_scaled_from(y->square_norm, norm_q), mass_x));
   struct scaled inverse_xy = fit_grid_reciprocal(
       scaled_mul(fit_scaled_from(x->linear_norm, 3 - 2 * x->linear_q), fit_scaled_from(y->linear_norm, 3 - 2 * y->linear_q)));
-  struct scaled softness = spread->softness;
-  int32_t q = system->residual_shift - 26 - m->square_q;
-  struct scaled along_x = scaled_mul(inverse_x, softness);
-  struct scaled along_y = scaled_mul(inverse_y, softness);
-  struct scaled along_xy = scaled_mul(inverse_xy, softness);
+  struct scaled inverse_stiffness = propagation->inverse_stiffness;
+  int32_t q = equations->residual_shift - 26 - m->square_q;
+  struct scaled along_x = scaled_mul(inverse_x, inverse_stiffness);
+  struct scaled along_y = scaled_mul(inverse_y, inverse_stiffness);
+  struct scaled along_xy = scaled_mul(inverse_xy, inverse_stiffness);
   shape->wider_x = scaled_mul(fit_scaled_from(m->b_x, q), along_x);
   shape->wider_y = scaled_mul(fit_scaled_from(m->b_y, q), along_y);
   shape->stretch = fit_scaled_short(scaled_sub(shape->wider_x, shape->wider_y));
-  shape->slant = scaled_mul(project_slant(m, readings, system->residual_shift), along_xy);
+  shape->slant = scaled_mul(project_slant(m, readings, equations->residual_shift), along_xy);
 
   struct scaled values[3] = {scaled_mul(shape->stretch, along_x), scaled_mul(shape->stretch, along_y), scaled_mul(shape->slant, along_xy)};
   shape->noise_form = scaled_add(scaled_add(scaled_mul(values[0], shape->stretch), scaled_mul(values[1], shape->stretch)),
                                  scaled_mul(values[2], shape->slant));
-  shape->noise_form = scaled_mul(shape->noise_form, softness);
+  shape->noise_form = scaled_mul(shape->noise_form, inverse_stiffness);
   values[0].exponent -= m->square_q;
   values[1].exponent -= m->square_q;
   values[2].exponent -= x->linear_q + y->linear_q - 15;
@@ -314,19 +310,18 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
   shape->xy = aligned[2];
 }
 
-/* cosh(v) and sinh(v) / v from v^2, Q13, for v^2 up to FIT_STRETCH_MAX^2: error below 1 %. */
+/* cosh(v) and sinh(v) / v from v^2, Q13, for v^2 up to FIT_ELONGATION_MAX^2: error below 1 %. */
 FIXED_INLINE int32_t cosh_q13(int32_t square_q13) { return 8192 + (square_q13 >> 1) + port_divide((square_q13 * square_q13) >> 13, 24); }
 FIXED_INLINE int32_t sinh_ratio_q13(int32_t square_q13) {
   return 8192 + port_divide(square_q13, 6) + port_divide((square_q13 * square_q13) >> 13, 120);
 }
 
-/* Covariance = sigma^2 exp(wider_x + wider_y) exp(S), S the symmetric matrix with stretch and
- * -stretch on its diagonal and slant beside it. */
+/* Covariance = sigma^2 exp(wider_x + wider_y) exp([stretch slant; slant -stretch]). */
 static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *result) {
   int32_t stretch = fit_scaled_to_fixed(shape->stretch, 13), slant = fit_scaled_to_fixed(shape->slant, 13);
   int32_t wider = fit_scaled_to_fixed(scaled_add(shape->wider_x, shape->wider_y), 13);
-  const int32_t most = (int32_t)(FIT_STRETCH_MAX * 8192.0f);
-  if (fixed_size(stretch) > (uint32_t)most || fixed_size(slant) > (uint32_t)most || fixed_size(wider) > 8192) {
+  const int32_t most = (int32_t)(FIT_ELONGATION_MAX * 8192.0f);
+  if (fixed_magnitude(stretch) > (uint32_t)most || fixed_magnitude(slant) > (uint32_t)most || fixed_magnitude(wider) > 8192) {
     return false;
   }
   int32_t square = (stretch * stretch + slant * slant) >> 13;
@@ -351,16 +346,15 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
   return true;
 }
 
-/* Each column is g of one axis at least, so that what a sensor moves is a number of its column of
- * nodes times gy and one of its row times gx. */
+/* Each column has g of one axis, so a sensor's influence is a number of its column of nodes times gy, and one of its row times gx. */
 struct moves {
-  int32_t column[MOST_COLUMNS], row[MOST_ROWS];
+  int32_t column[MAX_COLUMNS], row[MAX_ROWS];
 };
 
-/* As fit_grid_add_moves, without the room for the moves. */
-static NOINLINE void add_moves(const struct moments *m, const struct moves *moves, const struct readings *room, uint32_t *by_gains,
+/* As fit_grid_add_influence, without the work for the moves. */
+static NOINLINE void add_moves(const struct moments *m, const struct moves *moves, const struct readings *work, uint32_t *by_gains,
                                int32_t *by_shape) {
-  const int32_t *errors = room->q14, *shapes = room->residual;
+  const int32_t *errors = work->q14, *shapes = work->residual;
   uint32_t squares = *by_gains;
   int32_t sum = 0;
   for (int i = 0; i < COLUMNS; i++) {
@@ -369,7 +363,7 @@ static NOINLINE void add_moves(const struct moments *m, const struct moves *move
     UNROLL for (int j = 0; j < ROWS; j++) {
       int32_t move = (column * m->y.g_q14[j] + moves->row[j] * g) >> 15;
       int32_t high = (move * *errors++) >> 16;
-      squares += (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
+      squares += (uint32_t)(high * high) >> PROPAGATION_SQUARE_SHIFT;
       sum += (move * *shapes++) >> 4;
     }
   }
@@ -378,8 +372,8 @@ static NOINLINE void add_moves(const struct moments *m, const struct moves *move
 }
 
 /* The same for the shape's two columns, of the gains alone. */
-static NOINLINE void add_shape_moves(const struct moments *m, const struct moves *moves, const struct readings *room, struct shape *shape) {
-  const int32_t *errors = room->q14;
+static NOINLINE void add_shape_moves(const struct moments *m, const struct moves *moves, const struct readings *work, struct shape *shape) {
+  const int32_t *errors = work->q14;
   uint32_t squares = 0;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t column = moves->column[i], g = m->x.g_q14[i];
@@ -387,7 +381,7 @@ static NOINLINE void add_shape_moves(const struct moments *m, const struct moves
     UNROLL for (int j = 0; j < ROWS; j++) {
       int32_t move = (column * m->y.g_q14[j] + moves->row[j] * g + slant * m->y.linear[j]) >> 15;
       int32_t high = (move * *errors++) >> 16;
-      squares += (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
+      squares += (uint32_t)(high * high) >> PROPAGATION_SQUARE_SHIFT;
     }
   }
   shape->by_gains = squares;
@@ -395,9 +389,9 @@ static NOINLINE void add_shape_moves(const struct moments *m, const struct moves
 
 /* And of the profile's tail, which is off everywhere at once. */
 static NOINLINE void add_tail_moves(const struct moments *m, const struct moves *moves, const struct readings *readings,
-                                    const struct fit_system *system, int32_t gain_shift, struct shape *shape) {
+                                    const struct fit_equations *equations, int32_t gain_shift, struct shape *shape) {
   struct dip dip;
-  const int32_t depth_q28 = fit_grid_dip(readings->dip_height, TAIL_ERROR, &system->at, 1 << 28, system->rise_q22,
+  const int32_t depth_q28 = fit_grid_dip(readings->dip_curvature, TAIL_ERROR, &equations->at, 1 << 28, equations->rise_q22,
                                          (int32_t)(FIT_DIP_DEPTH_MAX * 268435456.0f), &dip);
   /* Larger only far beside the array, where the fit is at a limit. */
   const int32_t error = fixed_clamp((depth_q28 >> 12) * (1 << (gain_shift + 1)) / 2, 0, INT16_MAX);
@@ -412,7 +406,7 @@ static NOINLINE void add_tail_moves(const struct moments *m, const struct moves 
     }
   }
   const int32_t high = fixed_clamp(sum >> 12, -INT16_MAX, INT16_MAX);
-  shape->by_gains += (uint32_t)(high * high) >> SPREAD_SQUARE_SHIFT;
+  shape->by_gains += (uint32_t)(high * high) >> PROPAGATION_SQUARE_SHIFT;
 }
 
 /* A coefficient times the linear and one times the square column of an axis. */
@@ -422,58 +416,60 @@ FIXED_INLINE void set_parts(const struct factor *f, int nodes, int32_t linear, i
 
 /* What errors of single sensors make of the result. */
 static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings, const struct moments *m,
-                                   const struct fit_system *system, struct readings *room, struct fit_spread *spread, struct shape *shape) {
+                                   const struct fit_equations *equations, struct readings *work, struct fit_propagation *propagation,
+                                   struct shape *shape) {
   const struct factor *x = &m->x, *y = &m->y;
-  int32_t *moved = room->q28;
+  int32_t *moved = work->q28;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t g = x->g_q14[i];
     UNROLL for (int j = 0; j < ROWS; j++) { *moved++ = (g * y->g_q14[j]) >> 13; }
   }
-  fit_grid_set_errors(grid, settings, &system->at, room, spread);
+  fit_grid_set_errors(grid, settings, &equations->at, work, propagation);
   struct moves moves;
-  set_parts(x, COLUMNS, spread->x1, spread->x3, moves.column);
-  set_parts(y, ROWS, 0, spread->x3, moves.row);
-  add_moves(m, &moves, room, &spread->by_gains, &spread->shape_x);
-  set_parts(x, COLUMNS, 0, spread->y3, moves.column);
-  set_parts(y, ROWS, spread->y2, spread->y3, moves.row);
-  add_moves(m, &moves, room, &spread->by_gains, &spread->shape_y);
-  set_parts(x, COLUMNS, spread->f1, spread->f3, moves.column);
-  set_parts(y, ROWS, spread->f2, spread->f3, moves.row);
-  UNROLL for (int j = 0; j < ROWS; j++) { moves.row[j] += (spread->f0 * y->g_q14[j]) >> 13; }
-  add_moves(m, &moves, room, &spread->force_by_gains, &spread->shape_force);
+  set_parts(x, COLUMNS, propagation->x1, propagation->x3, moves.column);
+  set_parts(y, ROWS, 0, propagation->x3, moves.row);
+  add_moves(m, &moves, work, &propagation->by_gains, &propagation->shape_x);
+  set_parts(x, COLUMNS, 0, propagation->y3, moves.column);
+  set_parts(y, ROWS, propagation->y2, propagation->y3, moves.row);
+  add_moves(m, &moves, work, &propagation->by_gains, &propagation->shape_y);
+  set_parts(x, COLUMNS, propagation->f1, propagation->f3, moves.column);
+  set_parts(y, ROWS, propagation->f2, propagation->f3, moves.row);
+  UNROLL for (int j = 0; j < ROWS; j++) { moves.row[j] += (propagation->f0 * y->g_q14[j]) >> 13; }
+  add_moves(m, &moves, work, &propagation->force_by_gains, &propagation->shape_force);
   set_parts(x, COLUMNS, 0, shape->x * 2, moves.column);
   set_parts(y, ROWS, 0, shape->y * 2, moves.row);
-  add_shape_moves(m, &moves, room, shape);
-  if (room->dip_share.mantissa != 0) {
-    add_tail_moves(m, &moves, room, system, spread->gain_shift, shape);
+  add_shape_moves(m, &moves, work, shape);
+  if (work->dip_share.mantissa != 0) {
+    add_tail_moves(m, &moves, work, equations, propagation->gain_shift, shape);
   }
-  fit_grid_end_spread(settings, system, spread);
+  fit_grid_end_propagation(settings, equations, propagation);
 }
 
 /* The flags of the shape that apply. If it is elongated, separate widths would move the location. */
-static NOINLINE uint32_t judge_shape(const struct readings *readings, const struct fit_settings *settings, const struct fit_system *system,
-                                     const struct shape *shape, struct fit_spread *spread) {
-  const struct state *at = &system->at;
-  if (at->height > SHAPE_HEIGHT_MAX_Q26) {
+static NOINLINE uint32_t judge_shape(const struct readings *readings, const struct fit_settings *settings,
+                                     const struct fit_equations *equations, const struct shape *shape,
+                                     struct fit_propagation *propagation) {
+  const struct state *at = &equations->at;
+  if (at->curvature > SHAPE_HEIGHT_MAX_Q26) {
     return 0;
   }
   struct scaled length_square =
       fit_scaled_short(scaled_add(scaled_mul(shape->stretch, shape->stretch), scaled_mul(shape->slant, shape->slant)));
   struct scaled noise = fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28);
   struct scaled by_gains =
-      scaled_mul(fit_scaled_from((int32_t)shape->by_gains, SPREAD_SQUARE_SHIFT - 2 * spread->gain_shift + 2 * shape->exponent),
-                 scaled_mul(spread->amplitude, spread->amplitude));
+      scaled_mul(fit_scaled_from((int32_t)shape->by_gains, PROPAGATION_SQUARE_SHIFT - 2 * propagation->gain_shift + 2 * shape->exponent),
+                 scaled_mul(propagation->amplitude, propagation->amplitude));
   struct scaled variance = fit_scaled_short(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
   struct scaled least = scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE));
   uint32_t flags = 0;
   if (scaled_sub(scaled_mul(length_square, length_square), least).mantissa > 0) {
     flags |= CONTACT_FLAG_ELONGATED;
-    struct scaled x = scaled_mul(fit_scaled_from(2 * at->x - system->slope_x, -26), shape->wider_x);
-    struct scaled y = scaled_mul(fit_scaled_from(2 * at->y - system->slope_y, -26), shape->wider_y);
-    spread->apart = scaled_add(scaled_mul(x, x), scaled_mul(y, y));
+    struct scaled x = scaled_mul(fit_scaled_from(2 * at->x - equations->slope_x, -26), shape->wider_x);
+    struct scaled y = scaled_mul(fit_scaled_from(2 * at->y - equations->slope_y, -26), shape->wider_y);
+    propagation->elongation_shift = scaled_add(scaled_mul(x, x), scaled_mul(y, y));
     if (scaled_sub(length_square, LINEAR_SQUARE).mantissa > 0) {
       struct scaled share = scaled_mul(LINEAR_SQUARE, fit_grid_reciprocal(length_square));
-      spread->apart = scaled_mul(spread->apart, scaled_mul(share, share));
+      propagation->elongation_shift = scaled_mul(propagation->elongation_shift, scaled_mul(share, share));
     }
   }
   struct scaled known = scaled_mul(length_square, KNOWN_SQUARE);
@@ -530,7 +526,7 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
       }
     }
   }
-  int32_t across[MOST_ALONG], along[MOST_ALONG] = {0}, weighted_x[MOST_ALONG], weighted_y[MOST_ALONG];
+  int32_t across[MAX_SIDE], along[MAX_SIDE] = {0}, weighted_x[MAX_SIDE], weighted_y[MAX_SIDE];
   for (int i = 0; i < COLUMNS; i++) {
     int32_t sum = 0, at_peak = p[i * ROWS + peak_row];
     UNROLL for (int j = 0; j < ROWS; j++) {
@@ -543,32 +539,32 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   set_marginal(&m->y, along, weighted_y, ROWS);
   orthogonalise(m);
 
-  /* From the parabola's coefficients: height = -c3, centre = slope / 2 + c1 / (2 height). */
+  /* From the parabola's coefficients: curvature = -c3, centre = slope / 2 + c1 / (2 curvature). */
   struct scaled c1 = ridged(product_of(m->x.linear, weighted_x, COLUMNS), m->x.linear_norm, m->x.linear_q);
   struct scaled c2 = ridged(product_of(m->y.linear, weighted_y, ROWS), m->y.linear_norm, m->y.linear_q);
   struct scaled b3 =
       scaled_from(product_of(m->x.square, weighted_x, COLUMNS) + product_of(m->y.square, weighted_y, ROWS), -14 - m->square_q);
   struct scaled norm = scaled_from(m->x.square_norm + m->y.square_norm, 3 - 2 * m->square_q);
-  struct scaled height = scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, b3), scaled_add(norm, GUESS_RIDGE));
-  state->height = fixed_clamp(scaled_to_fixed(height, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
-  struct scaled half = scaled_div(scaled_from(1, -1), scaled_from(state->height, -26));
+  struct scaled curvature = scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, b3), scaled_add(norm, GUESS_RIDGE));
+  state->curvature = fixed_clamp(scaled_to_fixed(curvature, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
+  struct scaled half = scaled_div(scaled_from(1, -1), scaled_from(state->curvature, -26));
   int32_t x = (m->x.slope >> 1) + scaled_to_fixed(scaled_mul(c1, half), 26);
   int32_t y = (m->y.slope >> 1) + scaled_to_fixed(scaled_mul(c2, half), 26);
   state->x = fixed_clamp(x, grid->x_min + ONE_Q26 / 2, grid->x_max - ONE_Q26 / 2);
   state->y = fixed_clamp(y, grid->y_min + ONE_Q26 / 2, grid->y_max - ONE_Q26 / 2);
 }
 
-/* The dip, and the sensors' own: what of the readings is not the model's. */
+/* Removes from the readings what is not the Gaussian's: the dip, and the deviations of the sensors. */
 static NOINLINE void take_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                              const struct state *state, const struct moments *m, const struct fit_system *system, int left,
+                              const struct state *state, const struct moments *m, const struct fit_equations *equations, int left,
                               struct readings *readings) {
-  const int32_t rise_q22 = fit_grid_rise(system->at.height, m->x.offset, m->y.offset);
+  const int32_t rise_q22 = fit_grid_rise(equations->at.curvature, m->x.offset, m->y.offset);
   if (readings->dip_share.mantissa != 0) {
-    fit_grid_take_dip_out(array, pressure_Pa_q10, state, system->amplitude_q28, rise_q22, readings);
+    fit_grid_remove_dip(array, pressure_Pa_q10, state, equations->amplitude_q28, rise_q22, readings);
   }
-  if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
-    const int32_t peak_q28 = fit_grid_peak(system->amplitude_q28, rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
-    fit_grid_take_own_out(array, settings, ~(sensor_map)0, state, peak_q28, readings);
+  if (fit_has_deviations(settings) && left == FIT_DEVIATION_ITERATIONS) {
+    const int32_t peak_q28 = fit_grid_peak(equations->amplitude_q28, rise_q22, ONE, FIT_DEVIATION_PEAK_MAX_Q28);
+    fit_grid_remove_deviations(array, settings, ~(sensor_map)0, state, peak_q28, readings);
   }
 }
 
@@ -578,7 +574,7 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, con
   fit_use_rectangle(grid);
   struct readings readings;
   struct moments m;
-  struct fit_system system;
+  struct fit_equations equations;
   struct state state;
   if (!fit_grid_take_readings(array, pressure_Pa_q10, ~(sensor_map)0, settings, &readings)) {
     memset(result, 0, sizeof *result);
@@ -586,34 +582,34 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, con
     return false;
   }
   guess(grid, &readings, &m, &state);
-  system.cross = 0;
+  equations.cross = 0;
   int left = settings->iterations;
   int coarse = left - COARSE_ITERATIONS;
-  const int last = left > FIT_OWN_ITERATIONS ? FIT_OWN_ITERATIONS : 1; /* that takes out */
+  const int last = left > FIT_DEVIATION_ITERATIONS ? FIT_DEVIATION_ITERATIONS : 1; /* that takes out */
   do {
-    if (left < settings->iterations && left >= last && (readings.dip_share.mantissa != 0 || fit_has_own(settings))) {
-      take_out(array, pressure_Pa_q10, settings, &state, &m, &system, left, &readings);
+    if (left < settings->iterations && left >= last && (readings.dip_share.mantissa != 0 || fit_has_deviations(settings))) {
+      take_out(array, pressure_Pa_q10, settings, &state, &m, &equations, left, &readings);
     }
-    system.at = state;
-    evaluate(&readings, left > coarse && left > FINE_ITERATIONS, &m, &system);
-    fit_grid_step(grid, &system, &state);
+    equations.at = state;
+    evaluate(&readings, left > coarse && left > FINE_ITERATIONS, &m, &equations);
+    fit_grid_step(grid, &equations, &state);
     if (left == 0) { /* the guess is asked for: the step only shows how good it is */
-      state = system.at;
+      state = equations.at;
     }
     left--;
   } while (left > 0);
   result->flags = 0;
   result->used = first_sensors((unsigned)NODES);
   result->sigma_x_mm = result->sigma_y_mm = result->width_correlation = 0.0f;
-  finish(&readings, &m, &system);
-  struct fit_spread spread;
+  finish(&readings, &m, &equations);
+  struct fit_propagation propagation;
   struct shape shape;
   const struct fit_columns_q q = {m.x.linear_q, m.y.linear_q, m.square_q - 1};
-  fit_grid_begin_spread(readings.shift, &system, &q, &spread);
-  begin_shape(&readings, &m, &system, &spread, &shape);
-  spread_errors(grid, settings, &m, &system, &readings, &spread, &shape);
-  uint32_t flags = judge_shape(&readings, settings, &system, &shape, &spread);
-  bool rough = fit_grid_conclude(grid, &readings, settings, &system, &spread, &state, NODES, result);
+  fit_grid_begin_propagation(readings.shift, &equations, &q, &propagation);
+  begin_shape(&readings, &m, &equations, &propagation, &shape);
+  spread_errors(grid, settings, &m, &equations, &readings, &propagation, &shape);
+  uint32_t flags = judge_shape(&readings, settings, &equations, &shape, &propagation);
+  bool rough = fit_grid_conclude(grid, &readings, settings, &equations, &propagation, &state, NODES, result);
   if (!(result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL))) {
     if ((flags & CONTACT_FLAG_WIDTHS_VALID) && !set_widths(&shape, result)) {
       flags &= ~(uint32_t)CONTACT_FLAG_WIDTHS_VALID;

@@ -48,7 +48,7 @@ struct node {
   int32_t e;               /* Q30; then the residual, Q28 */
   int32_t mantissa, shift; /* e again, to 15 bits of its own: mantissa * 2^-(15 + shift) */
   int32_t d;               /* the dip there, in units of e, Q30 */
-  int32_t p1, p2, p3;      /* e times the polynomials of struct fit_system; |.| < 2^15 */
+  int32_t p1, p2, p3;      /* e times the polynomials of struct fit_equations; |.| < 2^15 */
 };
 
 /* The columns and the polynomials behind them. The polynomials are those that were orthogonal under the previous iterate, about the present
@@ -63,11 +63,11 @@ struct columns {
   int32_t cross;               /* p2 = dy - cross dx */
   int32_t skew_x, skew_y;      /* p3 = dx^2 + dy^2 - variance - skew_x dx - skew_y dy */
   int32_t variance;
-  int32_t mass;                 /* sum of (e - d)^2, Q(30 - MASS_SHIFT) */
-  int32_t product;              /* sum of e - d times the reading, Q(26 - PRODUCT_SHIFT) */
-  int32_t norm1, norm2, norm3;  /* value = integer * 2^(NORM_SHIFT - 2 q) */
-  int32_t f21, f31, f32;        /* L of L D L^T, Q12 in the units of the columns */
-  struct node node[MOST_NODES]; /* last: what is before is within reach of a short instruction */
+  int32_t mass;                /* sum of (e - d)^2, Q(30 - MASS_SHIFT) */
+  int32_t product;             /* sum of e - d times the reading, Q(26 - PRODUCT_SHIFT) */
+  int32_t norm1, norm2, norm3; /* value = integer * 2^(NORM_SHIFT - 2 q) */
+  int32_t f21, f31, f32;       /* L of L D L^T, Q12 in the units of the columns */
+  struct node node[MAX_NODES]; /* last: what is before is within reach of a short instruction */
 };
 
 /* Added to the norms: what it is in units of a column of the finest scale that is allowed. */
@@ -88,8 +88,7 @@ enum { STEP = sizeof(struct node) / sizeof(int32_t) };
 /* A column that the dip adds to may double when it is made orthogonal to the model. */
 #define COLUMN_BITS(has_dip) ((has_dip) ? 14 : 15)
 
-/* Brings a column in Qraw_q to this number of bits; returns its norm with the ridge. What is smaller stays
- * as it is, since there is nothing below its last bit. */
+/* Rounds a column in Qraw_q to this number of bits, unless it has fewer. Returns its norm with the ridge. */
 FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t bits, int32_t raw_q, const struct ridge *ridge, int32_t *q) {
   int32_t shift = fixed_bits(size) - bits;
   int32_t least = raw_q - ridge->finest_q;
@@ -110,7 +109,7 @@ FIXED_INLINE int32_t normalise(int32_t *column, uint32_t size, int32_t bits, int
 
 /* A polynomial as it applies to the model or on the dip: a part along x plus one along y. */
 struct polynomial {
-  int32_t x[MOST_COLUMNS], y[MOST_ROWS];
+  int32_t x[MAX_COLUMNS], y[MAX_ROWS];
 };
 
 /* The same of the dip, taken from a column. Returns the size with its own. */
@@ -119,7 +118,7 @@ static NOINLINE uint32_t take_dip(int32_t *column, const struct node *node, cons
     for (int j = 0; j < ROWS; j++) {
       int32_t value = *column - fixed_mul_16(p->x[i] + p->y[j], node->d >> 15);
       *column = value;
-      size |= fixed_size(value);
+      size |= fixed_magnitude(value);
       column += STEP;
       node++;
     }
@@ -138,7 +137,7 @@ FIXED_INLINE int32_t fill_column(int32_t *column, const struct node *node, const
     for (int j = 0; j < ROWS; j++) {
       int32_t value = fixed_mul_16(along_y ? x + along_y[j] : x, node->mantissa) >> node->shift;
       *to = value;
-      size |= fixed_size(value);
+      size |= fixed_magnitude(value);
       to += STEP;
       node++;
     }
@@ -188,7 +187,7 @@ static NOINLINE void set_mean(const struct readings *readings, struct columns *c
   for (int i = 0; i < COLUMNS; i++) {
     const int32_t x = i - ORIGIN_X;
     int32_t sum = 0;
-    UNROLL_BY(FIT_GRID_MAX_NODES)
+    UNROLL_BY(FIT_GRID_MAX_SIDE)
     for (int j = 0; j < ROWS; j++) {
       const int32_t y = j - ORIGIN_Y;
       int32_t weight = ((node->mantissa * node->mantissa) >> (node->shift + MASS_SHIFT)) >> node->shift;
@@ -232,7 +231,7 @@ static NOINLINE void set_mass(const struct readings *readings, struct columns *c
 struct dips {
   struct polynomial p1, p2, p3;
 };
-/* Pitches squared, SQUARE_Q: a contact and sensors in use that are further apart show no more. */
+/* Pitches squared, SQUARE_Q: a contact and sensors in use that are further elongation_shift show no more. */
 #define PART_MAX (32 << SQUARE_Q)
 static NOINLINE void set_dips(const struct columns *c, struct dips *dips) {
   const int32_t off_x = c->centre_x - c->mean_x, off_y = c->centre_y - c->mean_y;
@@ -289,7 +288,7 @@ static NOINLINE void fill_columns(const struct readings *readings, const struct 
     dip2 = &dips.p2;
     dip3 = &dips.p3;
   }
-  int32_t dx[MOST_COLUMNS], dy[MOST_ROWS], square_x[MOST_COLUMNS], square_y[MOST_ROWS];
+  int32_t dx[MAX_COLUMNS], dy[MAX_ROWS], square_x[MAX_COLUMNS], square_y[MAX_ROWS];
   int32_t mean_x = c->mean_x, mean_y = c->mean_y;
   int32_t cross = c->cross >> COEFFICIENT_SHIFT;
   int32_t skew_x = c->skew_x >> COEFFICIENT_SHIFT, skew_y = c->skew_y >> COEFFICIENT_SHIFT;
@@ -356,27 +355,27 @@ FIXED_INLINE struct scaled long_norm(int32_t norm, int32_t q) {
   return (struct scaled){norm * (1 << up), NORM_SHIFT - 2 * q - up};
 }
 
-/* The system from sums over the columns in Q q. */
-static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t sum2, int32_t sum3, int32_t q, struct fit_system *system) {
+/* The equations from sums over the columns in Q q. */
+static NOINLINE void eliminate(const struct columns *c, int32_t sum1, int32_t sum2, int32_t sum3, int32_t q,
+                               struct fit_equations *equations) {
   sum2 -= times_q12(sum1, c->f21);
   sum3 -= times_q12(sum1, c->f31) + times_q12(sum2, c->f32);
-  system->b1 = (struct scaled){sum1, -q - c->q1};
-  system->b2 = (struct scaled){sum2, -q - c->q2};
-  system->b3 = (struct scaled){sum3, -q - c->q3};
-  system->d1 = long_norm(c->norm1, c->q1);
-  system->d2 = long_norm(c->norm2, c->q2);
-  system->d3 = long_norm(c->norm3, c->q3);
-  system->mean_x = (c->mean_x + c->lift1) * LINEAR_TO_Q26;
-  system->mean_y = (c->mean_y + c->lift2 + times_q12(c->lift1, c->cross >> COEFFICIENT_SHIFT)) * LINEAR_TO_Q26;
-  system->cross = c->cross * LINEAR_TO_Q26;
-  system->slope_x = (2 * c->mean_x + c->skew_x) * LINEAR_TO_Q26;
-  system->slope_y = (2 * c->mean_y + c->skew_y) * LINEAR_TO_Q26;
+  equations->b1 = (struct scaled){sum1, -q - c->q1};
+  equations->b2 = (struct scaled){sum2, -q - c->q2};
+  equations->b3 = (struct scaled){sum3, -q - c->q3};
+  equations->d1 = long_norm(c->norm1, c->q1);
+  equations->d2 = long_norm(c->norm2, c->q2);
+  equations->d3 = long_norm(c->norm3, c->q3);
+  equations->mean_x = (c->mean_x + c->lift1) * LINEAR_TO_Q26;
+  equations->mean_y = (c->mean_y + c->lift2 + times_q12(c->lift1, c->cross >> COEFFICIENT_SHIFT)) * LINEAR_TO_Q26;
+  equations->cross = c->cross * LINEAR_TO_Q26;
+  equations->slope_x = (2 * c->mean_x + c->skew_x) * LINEAR_TO_Q26;
+  equations->slope_y = (2 * c->mean_y + c->skew_y) * LINEAR_TO_Q26;
 }
 
-/* First guess: the logarithm of the readings is a paraboloid, fitted with the readings themselves
- * as the weights. The ridge decides where too few of them are large. */
+/* First guess: a paraboloid fits the logarithm of the readings, weighted by them. A ridge decides where too few of them are large. */
 static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readings *readings, const struct fit_settings *settings,
-                           struct columns *c, struct fit_system *system, struct state *state) {
+                           struct columns *c, struct fit_equations *equations, struct state *state) {
   int32_t up = readings->shift > 0 ? readings->shift : 0, down = up - readings->shift;
   int32_t largest = (readings->largest >> down) * (1 << up);
   int32_t noise = settings->noise_Pa_q10 >> down;
@@ -384,7 +383,7 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   int32_t least = (largest >> 7) + (largest >> 9);
   least = noise * GUESS_NOISES > least ? noise * GUESS_NOISES : least;
   least = least < largest ? least : largest;
-  int32_t weighted[MOST_NODES];
+  int32_t weighted[MAX_NODES];
   for (int k = 0; k < NODES; k++) {
     int32_t p = readings->q28[k];
     bool enters = p >= least;
@@ -405,26 +404,25 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
     sum3 += (node->p3 * weighted[k]) >> NORM_SHIFT;
     node++;
   }
-  eliminate(c, sum1, sum2, sum3, 14 - NORM_SHIFT, system);
-  struct scaled c1 = scaled_div(short_of(system->b1), short_of(system->d1));
-  struct scaled c2 = scaled_div(short_of(system->b2), short_of(system->d2));
-  struct scaled height = scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, short_of(system->b3)), short_of(system->d3));
-  state->height = fixed_clamp(scaled_to_fixed(height, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
-  struct scaled half = scaled_div((struct scaled){1 << 14, -15}, scaled_from(state->height, -26));
-  c1 = scaled_sub(c1, scaled_mul(c2, scaled_from(system->cross, -26)));
+  eliminate(c, sum1, sum2, sum3, 14 - NORM_SHIFT, equations);
+  struct scaled c1 = scaled_div(scaled_short(equations->b1), scaled_short(equations->d1));
+  struct scaled c2 = scaled_div(scaled_short(equations->b2), scaled_short(equations->d2));
+  struct scaled curvature = scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, scaled_short(equations->b3)), scaled_short(equations->d3));
+  state->curvature = fixed_clamp(scaled_to_fixed(curvature, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
+  struct scaled half = scaled_div((struct scaled){1 << 14, -15}, scaled_from(state->curvature, -26));
+  c1 = scaled_sub(c1, scaled_mul(c2, scaled_from(equations->cross, -26)));
   int32_t x = scaled_to_fixed(scaled_mul(c1, half), 26);
   int32_t y = scaled_to_fixed(scaled_mul(c2, half), 26);
-  x = fixed_clamp(x, -(1 << 28), 1 << 28) + (system->slope_x >> 1);
-  y = fixed_clamp(y, -(1 << 28), 1 << 28) + (system->slope_y >> 1);
+  x = fixed_clamp(x, -(1 << 28), 1 << 28) + (equations->slope_x >> 1);
+  y = fixed_clamp(y, -(1 << 28), 1 << 28) + (equations->slope_y >> 1);
   state->x = fixed_clamp(x, grid->x_min, grid->x_max);
   state->y = fixed_clamp(y, grid->y_min, grid->y_max);
 }
 
-/* One factor of the separable Gaussian as mantissa (Q30, above 0.5) * 2^-shift, relative to the
- * nearest node. Returns the offset of the centre from that node, Q26. */
-static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes, int origin, int32_t centre, int32_t height) {
+/* One factor of the Gaussian, mantissa (Q30, above 0.5) 2^-shift, over that at the nearest node. Returns the centre from that node, Q26. */
+static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes, int origin, int32_t centre, int32_t curvature) {
   int32_t offset;
-  struct fit_exponent exponent = fit_exponent_first(nodes, origin, centre, height, &offset);
+  struct fit_exponent exponent = fit_exponent_first(nodes, origin, centre, curvature, &offset);
   for (int i = 0; i < nodes; i++) {
     shift[i] = (int32_t)(exponent.value >> 22);
     mantissa[i] = exp2_negative(exponent.value & 0x3FFFFF);
@@ -433,12 +431,11 @@ static NOINLINE int32_t set_factor(int32_t *mantissa, int32_t *shift, int nodes,
   return offset;
 }
 
-/* The model at the sensors in use, relative to the power of two of the strongest. Returns log2 of
- * the model at the centre in that unit, Q22. */
+/* The model at the sensors in use, over the power of two of the strongest. Returns log2 of the model at the centre in that unit, Q22. */
 static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused, struct columns *c) {
-  int32_t factor_x[MOST_COLUMNS], factor_y[MOST_ROWS], shift_x[MOST_COLUMNS], shift_y[MOST_ROWS];
-  int32_t offset_x = set_factor(factor_x, shift_x, COLUMNS, ORIGIN_X, at->x, at->height);
-  int32_t offset_y = set_factor(factor_y, shift_y, ROWS, ORIGIN_Y, at->y, at->height);
+  int32_t factor_x[MAX_COLUMNS], factor_y[MAX_ROWS], shift_x[MAX_COLUMNS], shift_y[MAX_ROWS];
+  int32_t offset_x = set_factor(factor_x, shift_x, COLUMNS, ORIGIN_X, at->x, at->curvature);
+  int32_t offset_y = set_factor(factor_y, shift_y, ROWS, ORIGIN_Y, at->y, at->curvature);
   int32_t strongest = INT32_MAX;
   struct node *node = c->node;
   for (int i = 0; i < COLUMNS; i++) {
@@ -467,12 +464,12 @@ static NOINLINE int32_t set_model(const struct state *at, const int32_t *unused,
     }
   }
   int32_t power = strongest < 100 ? strongest : 100;
-  return (power << 22) + fit_grid_rise(at->height, offset_x, offset_y);
+  return (power << 22) + fit_grid_rise(at->curvature, offset_x, offset_y);
 }
 
 #define DEPTH_MAX_Q28 (1 << 26)                                      /* of the strongest node, which is from a quarter to one */
 #define IN_ORDER(exponent, mantissa) ((exponent)*65536 + (mantissa)) /* of a positive struct scaled */
-#define SHAPE_LEAST IN_ORDER(-15, (int32_t)(FIT_SHAPE_LEAST * 32768.0f))
+#define SHAPE_MIN IN_ORDER(-15, (int32_t)(FIT_WIDTHS_SIGMA_MIN * 32768.0f))
 #define DIP_END_Q15 ((int32_t)(FIT_DIP_END * 32768.0f))
 #define NARROWNESS_MAX_Q12 (1 << 11) /* a dip is wider than its contact */
 
@@ -490,20 +487,20 @@ static NOINLINE void take_end(int32_t *dip, int32_t last, int32_t centre) {
 }
 
 /* The dip at the sensors in use. */
-static NOINLINE void set_dip(const struct readings *readings, const struct fit_system *system, struct columns *c) {
-  const struct state *at = &system->at;
+static NOINLINE void set_dip(const struct readings *readings, const struct fit_equations *equations, struct columns *c) {
+  const struct state *at = &equations->at;
   c->dip = readings->dip_share.mantissa != 0;
   if (!c->dip) {
     return;
   }
   c->centre_x = at->x / LINEAR_TO_Q26;
   c->centre_y = at->y / LINEAR_TO_Q26;
-  int32_t narrowness = port_divide(readings->dip_height, at->height >> 12);
+  int32_t narrowness = port_divide(readings->dip_curvature, at->curvature >> 12);
   c->narrowness_q12 = narrowness < NARROWNESS_MAX_Q12 ? narrowness : NARROWNESS_MAX_Q12;
   struct dip dip;
-  int32_t depth_q28 = fit_grid_dip(readings->dip_height, readings->dip_share, at, 1 << 28, system->rise_q22, DEPTH_MAX_Q28, &dip);
+  int32_t depth_q28 = fit_grid_dip(readings->dip_curvature, readings->dip_share, at, 1 << 28, equations->rise_q22, DEPTH_MAX_Q28, &dip);
   const struct scaled *known = &readings->prior_sigma;
-  if (IN_ORDER(known->exponent, known->mantissa) < SHAPE_LEAST) { /* not known: 0 */
+  if (IN_ORDER(known->exponent, known->mantissa) < SHAPE_MIN) { /* not known: 0 */
     if (COLUMNS > 2) {
       take_end(dip.x, COLUMNS - 1, at->x);
     }
@@ -531,8 +528,8 @@ FIXED_INLINE void orthogonal_columns(const struct columns *c, const struct node 
   column->p3 = node->p3 - times_q12(node->p1, c->f31) - times_q12(column->p2, c->f32);
 }
 
-/* What the result needs besides the system. */
-static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_system *system) {
+/* What the result needs besides the equations. */
+static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_equations *equations) {
   int32_t b0 = 0, squares = 0;
   for (int k = 0; k < NODES; k++) {
     int32_t r = shifted(c->node[k].e, finer);
@@ -540,73 +537,74 @@ static NOINLINE void finish(const struct columns *c, int32_t finer, struct fit_s
     r >>= SUM_BITS - 15;
     squares += (r * r) >> NORM_SHIFT;
   }
-  system->b0 = b0;
-  system->residual_shift = 11 - finer;
-  system->square_sum = (struct scaled){squares, NORM_SHIFT - 2 * (28 + finer - (SUM_BITS - 15))};
-  system->mass_q20 = c->mass >> (10 - MASS_SHIFT);
-  int32_t off_x = system->at.x - c->mean_x * LINEAR_TO_Q26;
-  int32_t off_y = system->at.y - c->mean_y * LINEAR_TO_Q26;
+  equations->b0 = b0;
+  equations->residual_shift = 11 - finer;
+  equations->square_sum = (struct scaled){squares, NORM_SHIFT - 2 * (28 + finer - (SUM_BITS - 15))};
+  equations->mass_q20 = c->mass >> (10 - MASS_SHIFT);
+  int32_t off_x = equations->at.x - c->mean_x * LINEAR_TO_Q26;
+  int32_t off_y = equations->at.y - c->mean_y * LINEAR_TO_Q26;
   int32_t bend = fixed_mul_q28(off_x, off_x) + fixed_mul_q28(off_y, off_y);
   bend -= fixed_mul_q28(off_x, c->skew_x * LINEAR_TO_Q26) + fixed_mul_q28(off_y, c->skew_y * LINEAR_TO_Q26);
   bend -= (c->variance + c->lift3) >> (LINEAR_Q - 24);
-  system->bend_q24 = fixed_clamp(bend, -(1 << 29), 1 << 29);
+  equations->p3_centre_q24 = fixed_clamp(bend, -(1 << 29), 1 << 29);
 }
 
 /* Adds that of the dip to the error of each reading. */
-static NOINLINE void add_dip_errors(const struct columns *c, struct readings *room, struct fit_spread *spread) {
+static NOINLINE void add_dip_errors(const struct columns *c, struct readings *work, struct fit_propagation *propagation) {
   uint32_t gains = 0;
   for (int k = 0; k < NODES; k++) {
     int32_t error = (c->node[k].d >> 15) * FIT_DIP_ERROR_Q16 >> 8;
-    error = room->q14[k] + ((error << (spread->gain_shift + 1)) >> 8);
+    error = work->q14[k] + ((error << (propagation->gain_shift + 1)) >> 8);
     error = error < INT16_MAX ? error : INT16_MAX;
-    room->q14[k] = error;
-    gains += (uint32_t)(error * error) >> SPREAD_SQUARE_SHIFT;
+    work->q14[k] = error;
+    gains += (uint32_t)(error * error) >> PROPAGATION_SQUARE_SHIFT;
   }
-  spread->gains = gains;
+  propagation->gains = gains;
 }
 
 /* What errors of single sensors make of the result. The columns are made orthogonal for it. */
 static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings, struct columns *c,
-                                   const struct fit_system *system, struct readings *room, struct fit_spread *spread) {
+                                   const struct fit_equations *equations, struct readings *work, struct fit_propagation *propagation) {
   const struct fit_columns_q q = {c->q1, c->q2, c->q3};
-  fit_grid_begin_spread(room->shift, system, &q, spread);
+  fit_grid_begin_propagation(work->shift, equations, &q, propagation);
   const int32_t most = 3 << 14;
   for (int k = 0; k < NODES; k++) {
     struct node *node = &c->node[k];
     struct column column;
     orthogonal_columns(c, node, &column);
-    node->e = room->q28[k] = column.e;
+    node->e = work->q28[k] = column.e;
     node->p2 = fixed_clamp(column.p2, -most, most);
     node->p3 = fixed_clamp(column.p3, -most, most);
   }
-  fit_grid_set_errors(grid, settings, &system->at, room, spread);
+  fit_grid_set_errors(grid, settings, &equations->at, work, propagation);
   if (c->dip) {
-    add_dip_errors(c, room, spread);
+    add_dip_errors(c, work, propagation);
   }
   const struct node *node = c->node;
   for (int k = 0; k < NODES; k++) {
-    room->q28[k] = (spread->x1 * node[k].p1 + spread->x2 * node[k].p2 + spread->x3 * node[k].p3) >> 15;
+    work->q28[k] = (propagation->x1 * node[k].p1 + propagation->x2 * node[k].p2 + propagation->x3 * node[k].p3) >> 15;
   }
-  fit_grid_add_moves(room, &spread->by_gains, &spread->shape_x);
+  fit_grid_add_influence(work, &propagation->by_gains, &propagation->shape_x);
   for (int k = 0; k < NODES; k++) {
-    room->q28[k] = (spread->y2 * node[k].p2 + spread->y3 * node[k].p3) >> 15;
+    work->q28[k] = (propagation->y2 * node[k].p2 + propagation->y3 * node[k].p3) >> 15;
   }
-  fit_grid_add_moves(room, &spread->by_gains, &spread->shape_y);
+  fit_grid_add_influence(work, &propagation->by_gains, &propagation->shape_y);
   for (int k = 0; k < NODES; k++) {
-    room->q28[k] = (spread->f0 * node[k].e + spread->f1 * node[k].p1 + spread->f2 * node[k].p2 + spread->f3 * node[k].p3) >> 15;
+    work->q28[k] =
+        (propagation->f0 * node[k].e + propagation->f1 * node[k].p1 + propagation->f2 * node[k].p2 + propagation->f3 * node[k].p3) >> 15;
   }
-  fit_grid_add_moves(room, &spread->force_by_gains, &spread->shape_force);
-  fit_grid_end_spread(settings, system, spread);
+  fit_grid_add_influence(work, &propagation->force_by_gains, &propagation->shape_force);
+  fit_grid_end_propagation(settings, equations, propagation);
 }
 
 enum accuracy { COARSE, FINE, LAST };
 
-static NOINLINE void evaluate(const struct readings *readings, enum accuracy accuracy, struct columns *c, struct fit_system *system) {
-  system->rise_q22 = set_model(&system->at, readings->residual, c);
-  set_dip(readings, system, c);
+static NOINLINE void evaluate(const struct readings *readings, enum accuracy accuracy, struct columns *c, struct fit_equations *equations) {
+  equations->rise_q22 = set_model(&equations->at, readings->residual, c);
+  set_dip(readings, equations, c);
   fill_columns(readings, &rounding_ridge, c);
   orthogonalise(c);
-  system->amplitude_q28 = fit_grid_amplitude(c->product, c->mass >> (16 + PRODUCT_SHIFT - MASS_SHIFT), accuracy != COARSE);
+  equations->amplitude_q28 = fit_grid_amplitude(c->product, c->mass >> (16 + PRODUCT_SHIFT - MASS_SHIFT), accuracy != COARSE);
   int32_t sum1 = 0, sum2 = 0, sum3 = 0;
   struct node *node = c->node;
   if (accuracy == COARSE) {
@@ -619,15 +617,15 @@ static NOINLINE void evaluate(const struct readings *readings, enum accuracy acc
       sum3 += (p * node->p3) >> COARSE_SHIFT;
       node++;
     }
-    eliminate(c, sum1, sum2, sum3, 14 - COARSE_SHIFT, system);
+    eliminate(c, sum1, sum2, sum3, 14 - COARSE_SHIFT, equations);
   } else {
     uint32_t size = 1;
     UNROLL
     for (int k = 0; k < NODES; k++) {
       int32_t model = c->dip ? node->e - node->d : node->e;
-      int32_t r = readings->q28[k] - fixed_mul_q30(system->amplitude_q28, model);
+      int32_t r = readings->q28[k] - fixed_mul_q30(equations->amplitude_q28, model);
       node->e = r;
-      size |= fixed_size(r);
+      size |= fixed_magnitude(r);
       node++;
     }
     /* As large as the sums allow: truncation hurts small residuals. */
@@ -642,12 +640,12 @@ static NOINLINE void evaluate(const struct readings *readings, enum accuracy acc
       sum3 += fixed_mul_16(r, node->p3);
       node++;
     }
-    eliminate(c, sum1, sum2, sum3, 12 + finer, system);
+    eliminate(c, sum1, sum2, sum3, 12 + finer, equations);
     if (accuracy == LAST) {
-      finish(c, finer, system);
+      finish(c, finer, equations);
     }
   }
-  fit_grid_complete(readings, system);
+  fit_grid_complete(readings, equations);
 }
 
 /* Readings in use, which sensors are not (in their residual's place), and how many are. False: nothing to fit. */
@@ -682,31 +680,31 @@ bool fit_grid_masked(const struct fit_array *array, const int32_t *pressure_Pa_q
     return false;
   }
   struct columns columns;
-  struct fit_system system;
+  struct fit_equations equations;
   struct state state;
-  guess(grid, &readings, settings, &columns, &system, &state);
+  guess(grid, &readings, settings, &columns, &equations, &state);
   if (readings.dip_share.mantissa != 0) {
-    fit_grid_take_below_zero(array, pressure_Pa_q10, usable, &readings);
+    fit_grid_restore_negative(array, pressure_Pa_q10, usable, &readings);
   }
   int left = settings->iterations;
   do {
     bool coarse = left > FINE_ITERATIONS && settings->iterations - left < COARSE_ITERATIONS;
-    if (fit_has_own(settings) && left == FIT_OWN_ITERATIONS) {
-      const int32_t peak_q28 = fit_grid_peak(system.amplitude_q28, system.rise_q22, ONE, FIT_OWN_PEAK_MAX_Q28);
-      fit_grid_take_own_out(array, settings, usable, &state, peak_q28, &readings);
+    if (fit_has_deviations(settings) && left == FIT_DEVIATION_ITERATIONS) {
+      const int32_t peak_q28 = fit_grid_peak(equations.amplitude_q28, equations.rise_q22, ONE, FIT_DEVIATION_PEAK_MAX_Q28);
+      fit_grid_remove_deviations(array, settings, usable, &state, peak_q28, &readings);
     }
-    system.at = state;
-    evaluate(&readings, left <= 1 ? LAST : coarse ? COARSE : FINE, &columns, &system);
-    fit_grid_step(grid, &system, &state);
+    equations.at = state;
+    evaluate(&readings, left <= 1 ? LAST : coarse ? COARSE : FINE, &columns, &equations);
+    fit_grid_step(grid, &equations, &state);
     if (left == 0) { /* the guess is asked for: the step only shows how good it is */
-      state = system.at;
+      state = equations.at;
     }
     left--;
   } while (left > 0);
   result->used = usable;
-  struct fit_spread spread;
-  spread_errors(grid, settings, &columns, &system, &readings, &spread);
-  return fit_grid_conclude(grid, &readings, settings, &system, &spread, &state, count, result);
+  struct fit_propagation propagation;
+  spread_errors(grid, settings, &columns, &equations, &readings, &propagation);
+  return fit_grid_conclude(grid, &readings, settings, &equations, &propagation, &state, count, result);
 }
 
 /* Q26, towards zero; within what fits. */
@@ -731,25 +729,25 @@ int fit_grid_outlier(const struct fit_array *array, const int32_t *pressure_Pa_q
   }
   float per_pitch = 1.0f / array->pitch_mm, sigma = result->sigma_mm * per_pitch;
   uint8_t origin = grid->sensor[ORIGIN_X * ROWS + ORIGIN_Y];
-  struct fit_system system;
-  system.at.x = q26_of(result->x_mm * per_pitch - array->x[origin]);
-  system.at.y = q26_of(result->y_mm * per_pitch - array->y[origin]);
-  system.at.height = fixed_clamp(q26_of(0.72134752f / (sigma * sigma)), HEIGHT_MIN_Q26, HEIGHT_MAX_Q26);
+  struct fit_equations equations;
+  equations.at.x = q26_of(result->x_mm * per_pitch - array->x[origin]);
+  equations.at.y = q26_of(result->y_mm * per_pitch - array->y[origin]);
+  equations.at.curvature = fixed_clamp(q26_of(0.72134752f / (sigma * sigma)), CURVATURE_MIN_Q26, CURVATURE_MAX_Q26);
   struct columns c;
   c.cross = c.skew_x = c.skew_y = 0;
   if (readings.dip_share.mantissa != 0) {
-    fit_grid_take_below_zero(array, pressure_Pa_q10, usable, &readings);
+    fit_grid_restore_negative(array, pressure_Pa_q10, usable, &readings);
   }
-  if (settings->own) {
+  if (settings->deviations) {
     const int32_t peak_q28 =
         fit_scaled_to_fixed(scaled_mul(fit_grid_scaled(result->p0_Pa), fit_scaled_from(1024, readings.shift - 28)), 28);
-    fit_grid_take_own_out(array, settings, usable, &system.at, fixed_clamp(peak_q28, 0, FIT_OWN_PEAK_MAX_Q28), &readings);
+    fit_grid_remove_deviations(array, settings, usable, &equations.at, fixed_clamp(peak_q28, 0, FIT_DEVIATION_PEAK_MAX_Q28), &readings);
   }
-  evaluate(&readings, FINE, &c, &system);
+  evaluate(&readings, FINE, &c, &equations);
 
   uint32_t size = 1;
   for (int k = 0; k < NODES; k++) {
-    size |= fixed_size(c.node[k].e);
+    size |= fixed_magnitude(c.node[k].e);
   }
   int32_t finer = 15 - fixed_bits(size);
   int32_t total = 0, worst = 0, second = 0;

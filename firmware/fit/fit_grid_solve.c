@@ -20,19 +20,19 @@ FIXED_INLINE struct scaled scaled_square(struct scaled a) { return scaled_mul(a,
 
 FIXED_INLINE struct scaled long_of(struct scaled a) { return (struct scaled){a.mantissa * (1 << 14), a.exponent - 14}; }
 
-void fit_grid_add_prior(const struct readings *readings, struct fit_system *system) {
-  struct scaled sigma = scaled_from(fit_grid_sigma(system->at.height), -26);
+void fit_grid_add_prior(const struct readings *readings, struct fit_equations *equations) {
+  struct scaled sigma = scaled_from(fit_grid_sigma(equations->at.curvature), -26);
   struct scaled pull = scaled_mul(scaled_sub(readings->prior_sigma, sigma), readings->prior_weight);
-  struct scaled row = scaled_div(scaled_mul(sigma, readings->prior_weight), system->stiffness);
-  system->prior_row = row;
-  system->d3 = long_of(scaled_add(short_of(system->d3), scaled_mul(row, row)));
-  system->b3 = long_of(scaled_add(short_of(system->b3), scaled_mul(row, pull)));
+  struct scaled row = scaled_div(scaled_mul(sigma, readings->prior_weight), equations->stiffness);
+  equations->prior_row = row;
+  equations->d3 = long_of(scaled_add(scaled_short(equations->d3), scaled_mul(row, row)));
+  equations->b3 = long_of(scaled_add(scaled_short(equations->b3), scaled_mul(row, pull)));
 }
 
 /* b / (d stiffness) in Qq, at most 2^30. Near the end b is small, and its last bits decide. */
 FIXED_INLINE int32_t step_along(const struct scaled *b, const struct scaled *d, const struct scaled *stiffness, int32_t q) {
   int32_t divisor = ((d->mantissa >> 14) * stiffness->mantissa) >> 13; /* below 2^18 */
-  int32_t up = 31 - fixed_bits(fixed_size(b->mantissa) | 1);
+  int32_t up = 31 - fixed_bits(fixed_magnitude(b->mantissa) | 1);
   int32_t quotient = port_divide(b->mantissa * (1 << up), divisor < 2 ? 2 : divisor);
   int32_t shift = b->exponent - up - d->exponent - stiffness->exponent - 27 + q;
   if (shift > 0) {
@@ -45,24 +45,24 @@ FIXED_INLINE int32_t step_along(const struct scaled *b, const struct scaled *d, 
 
 /* With c = b / d / stiffness:
  *   dsigma / sigma = c3,  dx = c1 - cross c2 + (2 x - slope_x) c3,  dy = c2 + (2 y - slope_y) c3. */
-void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system, struct state *state) {
-  int32_t c1 = step_along(&system->b1, &system->d1, &system->stiffness, 26);
-  int32_t c2 = step_along(&system->b2, &system->d2, &system->stiffness, 26);
-  int32_t ratio = step_along(&system->b3, &system->d3, &system->stiffness, 28);
-  system->c1_q26 = c1;
-  system->c2_q26 = c2;
-  system->c3_q28 = ratio;
-  int32_t dx = (c1 >> 4) + fixed_mul_q32(2 * system->at.x - system->slope_x, ratio);
-  if (system->cross != 0) {
-    dx -= fixed_mul_q28(c2 >> 2, system->cross);
+void fit_grid_step(const struct fit_grid_shape *grid, struct fit_equations *equations, struct state *state) {
+  int32_t c1 = step_along(&equations->b1, &equations->d1, &equations->stiffness, 26);
+  int32_t c2 = step_along(&equations->b2, &equations->d2, &equations->stiffness, 26);
+  int32_t ratio = step_along(&equations->b3, &equations->d3, &equations->stiffness, 28);
+  equations->c1_q26 = c1;
+  equations->c2_q26 = c2;
+  equations->c3_q28 = ratio;
+  int32_t dx = (c1 >> 4) + fixed_mul_q32(2 * equations->at.x - equations->slope_x, ratio);
+  if (equations->cross != 0) {
+    dx -= fixed_mul_q28(c2 >> 2, equations->cross);
   }
-  int32_t dy = (c2 >> 4) + fixed_mul_q32(2 * system->at.y - system->slope_y, ratio);
+  int32_t dy = (c2 >> 4) + fixed_mul_q32(2 * equations->at.y - equations->slope_y, ratio);
 
   /* The largest component in units of its limit, Q14. */
-  uint32_t most = (fixed_size(dx) >> 9) * MOVE_INVERSE_Q6 >> 5;
-  uint32_t other = (fixed_size(dy) >> 9) * MOVE_INVERSE_Q6 >> 5;
+  uint32_t most = (fixed_magnitude(dx) >> 9) * MOVE_INVERSE_Q6 >> 5;
+  uint32_t other = (fixed_magnitude(dy) >> 9) * MOVE_INVERSE_Q6 >> 5;
   most = other > most ? other : most;
-  other = (fixed_size(ratio) >> 14) * RATIO_INVERSE_Q1 >> 1;
+  other = (fixed_magnitude(ratio) >> 14) * RATIO_INVERSE_Q1 >> 1;
   most = other > most ? other : most;
   if (most > 1 << 14) {
     int32_t share_q15 = port_divide(1 << 29, (int32_t)most);
@@ -70,47 +70,46 @@ void fit_grid_step(const struct fit_grid_shape *grid, struct fit_system *system,
     dy = fixed_mul_16(dy, share_q15) * 2;
     ratio = fixed_mul_16(ratio, share_q15) * 2;
   }
-  system->move_x_q22 = dx;
-  system->move_y_q22 = dy;
-  state->x = fixed_clamp(system->at.x + dx * 16, grid->x_min - OVERSHOOT_Q26, grid->x_max + OVERSHOOT_Q26);
-  state->y = fixed_clamp(system->at.y + dy * 16, grid->y_min - OVERSHOOT_Q26, grid->y_max + OVERSHOOT_Q26);
+  equations->move_x_q22 = dx;
+  equations->move_y_q22 = dy;
+  state->x = fixed_clamp(equations->at.x + dx * 16, grid->x_min - OVERSHOOT_Q26, grid->x_max + OVERSHOOT_Q26);
+  state->y = fixed_clamp(equations->at.y + dy * 16, grid->y_min - OVERSHOOT_Q26, grid->y_max + OVERSHOOT_Q26);
 
-  /* height /= (1 + ratio)^2 as height -= height f (2 - f), f = ratio / (1 + ratio): relative
-   * precision is enough for f, and it goes to zero smoothly. */
+  /* curvature /= (1 + ratio)^2 as curvature -= curvature f (2 - f), f = ratio / (1 + ratio), which goes to zero smoothly. */
   int32_t inverse_q15 = port_divide(1 << 30, ((1 << 28) + ratio) >> 13);
   int32_t f = fixed_mul_16(ratio, inverse_q15 >> 1) * 4;
-  int32_t height = system->at.height;
+  int32_t curvature = equations->at.curvature;
   int32_t loss = 2 * f - (f >> 14) * (f >> 14); /* Q28, -3 .. 0.56 */
-  if (height < 1 << 28) {
-    height -= fixed_mul_q28(height, loss);
+  if (curvature < 1 << 28) {
+    curvature -= fixed_mul_q28(curvature, loss);
   } else {
-    height = (height >> 2) - fixed_mul_q28(height >> 2, loss);
-    height = height > HEIGHT_MAX_Q26 >> 2 ? HEIGHT_MAX_Q26 : height * 4;
+    curvature = (curvature >> 2) - fixed_mul_q28(curvature >> 2, loss);
+    curvature = curvature > CURVATURE_MAX_Q26 >> 2 ? CURVATURE_MAX_Q26 : curvature * 4;
   }
-  state->height = fixed_clamp(height, HEIGHT_MIN_Q26, HEIGHT_MAX_Q26);
+  state->curvature = fixed_clamp(curvature, CURVATURE_MIN_Q26, CURVATURE_MAX_Q26);
 }
 
 /* Peak at the centre after the step: 30-bit mantissa and exponent, Pa. */
-static int32_t peak_of(const struct readings *readings, const struct fit_system *system, int32_t *exponent) {
-  int32_t rise_q22 = fixed_clamp(system->rise_q22, 0, PEAK_RISE_MAX_Q22);
-  int32_t up = 30 - fixed_bits((uint32_t)system->amplitude_q28);
-  int32_t peak = fixed_mul_q30(system->amplitude_q28 * (1 << up), exp2_negative((1u << 22) - ((uint32_t)rise_q22 & 0x3FFFFF)));
+static int32_t peak_of(const struct readings *readings, const struct fit_equations *equations, int32_t *exponent) {
+  int32_t rise_q22 = fixed_clamp(equations->rise_q22, 0, PEAK_RISE_MAX_Q22);
+  int32_t up = 30 - fixed_bits((uint32_t)equations->amplitude_q28);
+  int32_t peak = fixed_mul_q30(equations->amplitude_q28 * (1 << up), exp2_negative((1u << 22) - ((uint32_t)rise_q22 & 0x3FFFFF)));
   *exponent = (rise_q22 >> 22) + 1 - up - 10 - readings->shift;
 
   /* The last step's own part, relative: c1 and c2 tilt the model about its mean, c3 bends it. */
-  const struct state *at = &system->at;
-  int32_t c1 = fixed_clamp(system->c1_q26, -ONE_Q26, ONE_Q26) * 16;
-  int32_t c2 = fixed_clamp(system->c2_q26, -ONE_Q26, ONE_Q26) * 16;
-  int32_t c3 = fixed_clamp(system->c3_q28, -(1 << 28), 1 << 28) * 4;
-  int32_t off_x = at->x - system->mean_x;
-  int32_t off_y = at->y - system->mean_y - fixed_mul_q26(system->cross, off_x);
+  const struct state *at = &equations->at;
+  int32_t c1 = fixed_clamp(equations->c1_q26, -ONE_Q26, ONE_Q26) * 16;
+  int32_t c2 = fixed_clamp(equations->c2_q26, -ONE_Q26, ONE_Q26) * 16;
+  int32_t c3 = fixed_clamp(equations->c3_q28, -(1 << 28), 1 << 28) * 4;
+  int32_t off_x = at->x - equations->mean_x;
+  int32_t off_y = at->y - equations->mean_y - fixed_mul_q26(equations->cross, off_x);
   int32_t tilt_q24 = fixed_mul_q32(c1, off_x) + fixed_mul_q32(c2, off_y);
-  int32_t lift_q22 = fixed_clamp(fixed_mul_q32(c3, system->bend_q24) + (tilt_q24 >> 2), -(1 << 21), 1 << 21);
-  int32_t growth_q24 = fixed_mul_q32(at->height, lift_q22 * (1 << 8));
-  growth_q24 = fixed_mul_16(growth_q24, STIFFNESS_PER_HEIGHT_Q14) * 4;
+  int32_t lift_q22 = fixed_clamp(fixed_mul_q32(c3, equations->p3_centre_q24) + (tilt_q24 >> 2), -(1 << 21), 1 << 21);
+  int32_t growth_q24 = fixed_mul_q32(at->curvature, lift_q22 * (1 << 8));
+  growth_q24 = fixed_mul_16(growth_q24, STIFFNESS_PER_CURVATURE_Q14) * 4;
   /* The amplitude's rounding. */
-  int32_t scale_q12 = fixed_mul_q32(system->mass_q20 * 16, system->amplitude_q28) >> 8;
-  growth_q24 += shifted(port_divide(system->b0, scale_q12 + 1), system->residual_shift - 2);
+  int32_t scale_q12 = fixed_mul_q32(equations->mass_q20 * 16, equations->amplitude_q28) >> 8;
+  growth_q24 += shifted(port_divide(equations->b0, scale_q12 + 1), equations->residual_shift - 2);
   int32_t growth = fixed_clamp(growth_q24, -(1 << 23), 1 << 23) * 16;
   peak = fixed_mul_q28(peak, (1 << 28) + growth);
   if (peak >= 1 << 30) {
@@ -131,13 +130,12 @@ FIXED_INLINE struct scaled scaled_mean(struct scaled sum, int count) {
   return scaled_mul(sum, (struct scaled){port_divide((1 << up) - 1, count), -up});
 }
 
-/* Raises the inverse of d3 to that by which the variance of a reading gives that of c3: the prior's
- * row varies by a width of its own, not as the readings do. */
-static NOINLINE void widen_for_prior(const struct readings *readings, const struct fit_system *system, const struct scaled *variance,
+/* Raises the inverse of d3, so that times the variance of a reading it gives that of c3: the prior's row has another variance. */
+static NOINLINE void widen_for_prior(const struct readings *readings, const struct fit_equations *equations, const struct scaled *variance,
                                      struct scaled *inverse3) {
   struct scaled excess = fit_scaled_short(scaled_sub(scaled_square(readings->prior_sd), *variance));
   if (excess.mantissa > 0) {
-    struct scaled share = scaled_mul(system->prior_row, *inverse3);
+    struct scaled share = scaled_mul(equations->prior_row, *inverse3);
     struct scaled more = scaled_mul(scaled_mul(excess, scaled_square(share)), fit_grid_reciprocal(*variance));
     *inverse3 = scaled_add(*inverse3, more);
   }
@@ -145,12 +143,12 @@ static NOINLINE void widen_for_prior(const struct readings *readings, const stru
 
 /* Location, width, peak and force; returns the force. */
 static NOINLINE struct scaled set_values(const struct fit_grid_shape *grid, const struct readings *readings,
-                                         const struct fit_system *system, const struct state *state, struct fit_result *result) {
+                                         const struct fit_equations *equations, const struct state *state, struct fit_result *result) {
   int32_t x = fixed_clamp(state->x, grid->x_min, grid->x_max);
   int32_t y = fixed_clamp(state->y, grid->y_min, grid->y_max);
   int32_t peak_exponent;
-  int32_t peak = peak_of(readings, system, &peak_exponent);
-  int32_t sigma = fit_grid_sigma(state->height);
+  int32_t peak = peak_of(readings, equations, &peak_exponent);
+  int32_t sigma = fit_grid_sigma(state->curvature);
   int32_t up = 30 - fixed_bits((uint32_t)sigma);
   int32_t sigma_square = fixed_mul_q30(sigma * (1 << up), sigma * (1 << up));
   int32_t force = fixed_mul_q30(fixed_mul_q30(peak, sigma_square), grid->force_scale);
@@ -166,43 +164,42 @@ static NOINLINE struct scaled set_values(const struct fit_grid_shape *grid, cons
 
 /* The flags that need no variance. */
 static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid, const struct readings *readings, const struct fit_settings *settings,
-                                  const struct fit_system *system, const struct state *state) {
+                                  const struct fit_equations *equations, const struct state *state) {
   uint32_t flags = CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID;
   if (settings->noise_Pa_q10 > port_divide(readings->largest, FIT_LOW_SIGNAL_SIGMA)) {
     flags |= CONTACT_FLAG_LOW_SIGNAL;
   }
-  if (state->height <= FLAT_HEIGHT_Q26) {
+  if (state->curvature <= FLAT_HEIGHT_Q26) {
     flags |= CONTACT_FLAG_FLAT;
   }
   if (state->x <= grid->x_min || state->x >= grid->x_max || state->y <= grid->y_min || state->y >= grid->y_max ||
-      state->height <= HEIGHT_MIN_Q26 || state->height >= HEIGHT_MAX_Q26 || system->amplitude_q28 <= AMPLITUDE_MIN_Q28 ||
-      system->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
+      state->curvature <= CURVATURE_MIN_Q26 || state->curvature >= CURVATURE_MAX_Q26 || equations->amplitude_q28 <= AMPLITUDE_MIN_Q28 ||
+      equations->amplitude_q28 >= AMPLITUDE_MAX_Q28) {
     flags |= CONTACT_FLAG_AT_BOUND;
   }
   return flags;
 }
 
-/* By what the variance of the readings gives that of the force's share, times the amplitude
- * squared: the mean of the model adds one over its mass. */
-static NOINLINE struct scaled force_form(const struct fit_spread *spread, const struct scaled *inverse3) {
-  struct scaled off_x = fit_scaled_from(spread->off_x, -26);
-  struct scaled off_y = fit_scaled_from(spread->off_y, -26);
-  struct scaled lift = fit_scaled_from(spread->lift_q24, -24);
-  struct scaled form = scaled_add(spread->inverse_mass, scaled_mul(scaled_square(off_x), spread->inverse1));
-  form = scaled_add(form, scaled_mul(scaled_square(off_y), spread->inverse2));
+/* Variance of the force's share, where readings have 1, times the amplitude squared: the mean of the model adds one over its mass. */
+static NOINLINE struct scaled force_form(const struct fit_propagation *propagation, const struct scaled *inverse3) {
+  struct scaled off_x = fit_scaled_from(propagation->off_x, -26);
+  struct scaled off_y = fit_scaled_from(propagation->off_y, -26);
+  struct scaled lift = fit_scaled_from(propagation->centre_q24, -24);
+  struct scaled form = scaled_add(propagation->inverse_mass, scaled_mul(scaled_square(off_x), propagation->inverse1));
+  form = scaled_add(form, scaled_mul(scaled_square(off_y), propagation->inverse2));
   return scaled_add(form, scaled_mul(scaled_square(lift), *inverse3));
 }
 
 /* The same of the location, times the stiffness squared, pitches. */
-static NOINLINE struct scaled location_form(const struct fit_system *system, const struct fit_spread *spread,
+static NOINLINE struct scaled location_form(const struct fit_equations *equations, const struct fit_propagation *propagation,
                                             const struct scaled *inverse3) {
-  int32_t along_x = (2 * system->at.x - system->slope_x) >> 16; /* Q10 */
-  int32_t along_y = (2 * system->at.y - system->slope_y) >> 16;
+  int32_t along_x = (2 * equations->at.x - equations->slope_x) >> 16; /* Q10 */
+  int32_t along_y = (2 * equations->at.y - equations->slope_y) >> 16;
   struct scaled slopes = fit_scaled_from(along_x * along_x + along_y * along_y, -20);
-  struct scaled form = scaled_add(scaled_add(spread->inverse1, spread->inverse2), scaled_mul(slopes, *inverse3));
-  if (system->cross != 0) {
-    struct scaled cross = fit_scaled_from(system->cross, -26);
-    form = scaled_add(form, scaled_mul(scaled_square(cross), spread->inverse2));
+  struct scaled form = scaled_add(scaled_add(propagation->inverse1, propagation->inverse2), scaled_mul(slopes, *inverse3));
+  if (equations->cross != 0) {
+    struct scaled cross = fit_scaled_from(equations->cross, -26);
+    form = scaled_add(form, scaled_mul(scaled_square(cross), propagation->inverse2));
   }
   return form;
 }
@@ -214,10 +211,12 @@ struct scatter {
   bool misfit, rough, other_model;
 };
 
-static NOINLINE void set_scatter(const struct readings *readings, const struct fit_settings *settings, const struct fit_system *system,
-                                 const struct fit_spread *spread, int count, struct scatter *scatter, struct fit_result *result) {
-  struct scaled left = fit_scaled_from(system->b0, system->residual_shift - 38);
-  struct scaled square_sum = scaled_sub(fit_scaled_short(system->square_sum), scaled_mul(scaled_square(left), spread->inverse_mass));
+static NOINLINE void set_scatter(const struct readings *readings, const struct fit_settings *settings,
+                                 const struct fit_equations *equations, const struct fit_propagation *propagation, int count,
+                                 struct scatter *scatter, struct fit_result *result) {
+  struct scaled left = fit_scaled_from(equations->b0, equations->residual_shift - 38);
+  struct scaled square_sum =
+      scaled_sub(fit_scaled_short(equations->square_sum), scaled_mul(scaled_square(left), propagation->inverse_mass));
   square_sum.mantissa = square_sum.mantissa < 0 ? 0 : square_sum.mantissa;
   struct scaled rms = fit_scaled_sqrt(scaled_mean(square_sum, count));
   result->residual_rms_Pa = fit_float(rms.mantissa, rms.exponent + 18 - readings->shift);
@@ -225,8 +224,8 @@ static NOINLINE void set_scatter(const struct readings *readings, const struct f
   scatter->noise = scaled_square(fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28));
   struct scaled model = scaled_mul(fit_scaled_from(settings->model_sd_q16, -16), fit_scaled_from(readings->largest, readings->shift - 28));
   scatter->all = scaled_add(scatter->noise, scaled_square(model));
-  struct scaled amplitude_square = scaled_square(spread->amplitude);
-  struct scaled gains = fit_scaled_from((int32_t)spread->gains, SPREAD_SQUARE_SHIFT - 32 - 2 * spread->gain_shift);
+  struct scaled amplitude_square = scaled_square(propagation->amplitude);
+  struct scaled gains = fit_scaled_from((int32_t)propagation->gains, PROPAGATION_SQUARE_SHIFT - 32 - 2 * propagation->gain_shift);
   gains = scaled_mul(scaled_mean(gains, count), amplitude_square);
   struct scaled expected = scaled_add(scatter->all, gains);
   struct scaled found = scaled_mean(square_sum, count > 4 ? count - 4 : 1);
@@ -235,55 +234,57 @@ static NOINLINE void set_scatter(const struct readings *readings, const struct f
   if (excess.mantissa > 0) {
     int32_t ratio_q10 = fit_scaled_to_fixed(scaled_mul(found, fit_grid_reciprocal(expected)), 10);
     scatter->misfit = ratio_q10 > (FIT_MISFIT * FIT_MISFIT) << 10;
-    int32_t times_q10 = fixed_clamp(ratio_q10 / FIT_MISFIT_BEGIN, 1 << 10, FIT_MISFIT_MOST << 10);
+    int32_t times_q10 = fixed_clamp(ratio_q10 / FIT_MISFIT_BEGIN, 1 << 10, FIT_MISFIT_MAX << 10);
     excess = fit_scaled_from(excess.mantissa * times_q10, excess.exponent - 10);
     scatter->all = scaled_add(scatter->all, excess);
   }
 
-  struct scaled mass = fit_scaled_from(system->mass_q20, -20);
+  struct scaled mass = fit_scaled_from(equations->mass_q20, -20);
   struct scaled total = scaled_add(scaled_mul(amplitude_square, mass), square_sum);
   scatter->rough = scaled_sub(scaled_mul(square_sum, ROUGH_INVERSE_SQUARE), total).mantissa > 0;
   scatter->other_model = scaled_sub(scaled_mul(square_sum, MODEL_INVERSE_SQUARE), total).mantissa > 0;
 }
 
 bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings *readings, const struct fit_settings *settings,
-                       const struct fit_system *system, const struct fit_spread *spread, const struct state *state, int count,
-                       struct fit_result *result) {
-  struct scaled force = set_values(grid, readings, system, state, result);
-  uint32_t flags = flags_of(grid, readings, settings, system, state);
+                       const struct fit_equations *equations, const struct fit_propagation *propagation, const struct state *state,
+                       int count, struct fit_result *result) {
+  struct scaled force = set_values(grid, readings, equations, state, result);
+  uint32_t flags = flags_of(grid, readings, settings, equations, state);
   struct scatter scatter;
-  set_scatter(readings, settings, system, spread, count, &scatter, result);
-  struct scaled inverse3 = spread->inverse3;
+  set_scatter(readings, settings, equations, propagation, count, &scatter, result);
+  struct scaled inverse3 = propagation->inverse3;
   if (readings->prior_weight.mantissa != 0) {
-    widen_for_prior(readings, system, &scatter.all, &inverse3);
+    widen_for_prior(readings, equations, &scatter.all, &inverse3);
   }
 
   struct scaled pitch = scaled_near(grid->pitch, grid->pitch_exponent - 6);
-  struct scaled form = scaled_mul(location_form(system, spread, &inverse3), scaled_square(scaled_mul(spread->softness, pitch))); /* mm */
+  struct scaled form = scaled_mul(location_form(equations, propagation, &inverse3),
+                                  scaled_square(scaled_mul(propagation->inverse_stiffness, pitch))); /* mm */
   struct scaled sd = fit_scaled_sqrt(scaled_mul(scatter.noise, form));
   result->location_noise_mm = fit_scaled_float(sd);
-  struct scaled move_x = fit_scaled_from(system->move_x_q22, -22); /* what it moved is not settled */
-  struct scaled move_y = fit_scaled_from(system->move_y_q22, -22);
-  struct scaled apart = scaled_add(scaled_square(move_x), scaled_square(move_y));
-  apart = scaled_add(scaled_add(spread->location_variance, spread->apart), apart);
-  apart = scaled_mul(apart, scaled_square(pitch));
-  sd = flags & CONTACT_FLAG_AT_BOUND ? scaled_mul(BOUND_SD, pitch) : fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), apart));
+  struct scaled move_x = fit_scaled_from(equations->move_x_q22, -22); /* what it moved is not settled */
+  struct scaled move_y = fit_scaled_from(equations->move_y_q22, -22);
+  struct scaled elongation_shift = scaled_add(scaled_square(move_x), scaled_square(move_y));
+  elongation_shift = scaled_add(scaled_add(propagation->location_variance, propagation->elongation_shift), elongation_shift);
+  elongation_shift = scaled_mul(elongation_shift, scaled_square(pitch));
+  sd = flags & CONTACT_FLAG_AT_BOUND ? scaled_mul(BOUND_SD, pitch)
+                                     : fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), elongation_shift));
   result->location_sd_mm = fit_scaled_float(sd);
   struct scaled limit = fit_grid_scaled(fit_location_sd_limit_mm(settings));
   if (scaled_sub(sd, limit).mantissa > 0) {
     flags |= CONTACT_FLAG_UNCERTAIN;
   }
 
-  form = scaled_mul(force_form(spread, &inverse3), fit_grid_reciprocal(scaled_square(spread->amplitude)));
-  sd = fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), spread->force_variance));
+  form = scaled_mul(force_form(propagation, &inverse3), fit_grid_reciprocal(scaled_square(propagation->amplitude)));
+  sd = fit_scaled_sqrt(scaled_add(scaled_mul(scatter.all, form), propagation->force_variance));
   sd = scaled_mul(sd, force);
   result->force_sd_N = fit_scaled_float(sd);
 
   if (scatter.other_model) {
     flags |= CONTACT_FLAG_MODEL;
   }
-  int32_t x_q22 = fixed_clamp(system->move_x_q22, -(1 << 15), 1 << 15);
-  int32_t y_q22 = fixed_clamp(system->move_y_q22, -(1 << 15), 1 << 15);
+  int32_t x_q22 = fixed_clamp(equations->move_x_q22, -(1 << 15), 1 << 15);
+  int32_t y_q22 = fixed_clamp(equations->move_y_q22, -(1 << 15), 1 << 15);
   bool settled = ((x_q22 * x_q22) >> 1) + ((y_q22 * y_q22) >> 1) <= grid->settled_square;
   result->flags |= flags;
   return scatter.misfit && scatter.rough && settled;

@@ -8,15 +8,15 @@
 #define MODEL_SD_Q16 131 /* 0.002 of the largest reading */
 /* Readings whose errors are more than 3 % of their unit determine no shape. */
 #define BASE_MAX_Q22 (1 << 17)
-/* Frames of a contact, counted from 1. The tangential force joins its model once the line has settled. From the first
- * that answers on, one frame answers where the models are, and the next steps. */
+/* Frames of a contact, from 1. The tangential force joins the line once that has settled. Later every other frame answers, the next steps.
+ */
 #define FIRST_WITH_FORCE 10
 #define FIRST_ANSWER FIT_SHAPES_FRAMES
 #define LAST_FRAME (FIRST_ANSWER + 1)
 /* The best of the models explains nothing if its chi^2 is above that. */
 #define CHI_SQUARE_MAX 100
 
-static const uint8_t unknowns_of[MODELS] = {BALANCE, UNKNOWNS, PULL_Y};
+static const uint8_t unknowns_of[MODELS] = {BALANCE, UNKNOWNS, TANGENTIAL_Y};
 
 static int32_t place_q20(const struct fit_shapes_pad *pad, float mm) {
   return fixed_mul_q28(fixed_clamp(fit_fixed(mm, 20), -(1 << 29), 1 << 29), pad->per_pitch_q28);
@@ -24,10 +24,10 @@ static int32_t place_q20(const struct fit_shapes_pad *pad, float mm) {
 
 /* What a calibration knows of the pad. */
 static NOINLINE void set_known(const struct fit_array *array, const struct fit_settings *settings, struct fit_shapes_pad *pad) {
-  struct fit_shapes_frame *frame = &pad->room.frame;
-  frame->has_own = settings->own != NULL;
-  for (int k = 0; frame->has_own && k < NODES; k++) {
-    pad->room.own[k] = settings->own[array->grid.sensor[k]];
+  struct fit_shapes_frame *frame = &pad->work.frame;
+  frame->has_deviations = settings->deviations != NULL;
+  for (int k = 0; frame->has_deviations && k < NODES; k++) {
+    pad->work.deviations[k] = settings->deviations[array->grid.sensor[k]];
   }
   frame->dip_share_q16 = 0;
   if (fit_has_dip(settings)) {
@@ -41,25 +41,26 @@ static NOINLINE void set_known(const struct fit_array *array, const struct fit_s
 static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fit, struct fit_shapes_state *state, int32_t sum_q20) {
   int32_t x = place_q20(pad, fit->x_mm) - pad->origin_x_q20;
   int32_t y = place_q20(pad, fit->y_mm) - pad->origin_y_q20;
-  if (state->frames > 0 && fit_is_another(sum_q20, state->sum_q20)) {
+  if (state->frames > 0 && fit_is_another_contact(sum_q20, state->sum_q20)) {
     state->frames = 0;
   }
   if (state->frames > 0) {
     int32_t dx_q20 = x - state->fit_x_q20, dy_q20 = y - state->fit_y_q20;
     int32_t sd_q20 = place_q20(pad, fit->location_sd_mm);
-    if (fixed_longer_leg((int32_t)fixed_size(dx_q20), (int32_t)fixed_size(dy_q20)) <= sd_q20) {
+    if (fixed_hypot((int32_t)fixed_magnitude(dx_q20), (int32_t)fixed_magnitude(dy_q20)) <= sd_q20) {
       dx_q20 = dy_q20 = 0;
     }
     int32_t share_q13 = fixed_clamp(port_divide(sum_q20, state->sum_q20 >> 13), 0, INT16_MAX);
     for (int m = 0; m < MODELS; m++) {
       int32_t *value = state->at[m].value;
       value[AMPLITUDE] = shifted(fixed_mul_16(value[AMPLITUDE], share_q13), 3);
-      value[AMPLITUDE] = fixed_clamp(value[AMPLITUDE], AMPLITUDE_LEAST, AMPLITUDE_MAX);
-      value[PLACE_X] += dx_q20;
-      value[PLACE_Y] += dy_q20;
-      value[PLACE_X] = fixed_clamp(value[PLACE_X], MIDDLE_OF(COLUMNS) - PLACE_MAX_OF(COLUMNS), MIDDLE_OF(COLUMNS) + PLACE_MAX_OF(COLUMNS));
-      value[PLACE_Y] = fixed_clamp(value[PLACE_Y], MIDDLE_OF(ROWS) - PLACE_MAX_OF(ROWS), MIDDLE_OF(ROWS) + PLACE_MAX_OF(ROWS));
-      for (int u = m == ROUND ? SPAN_X : PULL_X; m != TWO && u < unknowns_of[m]; u++) {
+      value[AMPLITUDE] = fixed_clamp(value[AMPLITUDE], AMPLITUDE_MIN, AMPLITUDE_MAX);
+      value[LOCATION_X] += dx_q20;
+      value[LOCATION_Y] += dy_q20;
+      value[LOCATION_X] =
+          fixed_clamp(value[LOCATION_X], MIDDLE_OF(COLUMNS) - LOCATION_MAX_OF(COLUMNS), MIDDLE_OF(COLUMNS) + LOCATION_MAX_OF(COLUMNS));
+      value[LOCATION_Y] = fixed_clamp(value[LOCATION_Y], MIDDLE_OF(ROWS) - LOCATION_MAX_OF(ROWS), MIDDLE_OF(ROWS) + LOCATION_MAX_OF(ROWS));
+      for (int u = m == ROUND ? SPAN_X : TANGENTIAL_X; m != TWO && u < unknowns_of[m]; u++) {
         value[u] = shifted(fixed_mul_16(value[u], share_q13), 3);
       }
     }
@@ -70,10 +71,10 @@ static void follow(const struct fit_shapes_pad *pad, const struct fit_result *fi
 }
 
 static void set_residuals(struct fit_shapes_pad *pad, int model, struct fit_shapes_state *state, struct priors *priors) {
-  struct fit_shapes_equations *equations = &pad->room.equations[model];
+  struct fit_shapes_equations *equations = &pad->work.equations[model];
   const bool early = model == LONG && state->frames < FIRST_WITH_FORCE;
   struct fit_shapes_at *at = &state->at[model];
-  fit_shapes_round_places(at);
+  fit_shapes_round_locations(at);
   fit_shapes_set_rows(pad, model, early ? BALANCE : unknowns_of[model], at, equations);
   fit_shapes_form_residuals(pad, at->value, priors, equations);
   state->chi_square_q8[model] = fit_shapes_chi_square(pad, equations);
@@ -113,12 +114,12 @@ static enum fit_shapes_progress answer(const struct fit_shapes_pad *pad, struct 
 /* What all parts of a frame need. */
 static bool take(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                  const struct fit_result *fit, struct fit_shapes_pad *pad) {
-  struct fit_shapes_frame *frame = &pad->room.frame;
+  struct fit_shapes_frame *frame = &pad->work.frame;
   struct readings readings;
   struct fit_base base;
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
       !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, settings, &readings) ||
-      fit_grid_weigh(array, settings, fit->used, &readings, 1 << 18, MODEL_SD_Q16, pad->room.weight_q12, &base) < FIT_SHAPES_SENSORS ||
+      fit_grid_weigh(array, settings, fit->used, &readings, 1 << 18, MODEL_SD_Q16, pad->work.weight_q12, &base) < FIT_SHAPES_SENSORS ||
       base.base_q22 > BASE_MAX_Q22) {
     return false;
   }
@@ -139,7 +140,7 @@ enum fit_shapes_progress fit_shapes_part(const struct fit_array *array, struct f
     return forget(state, result);
   }
   if (first) {
-    follow(pad, fit, state, fit_grid_sum_q20(pad->room.frame.q28));
+    follow(pad, fit, state, fit_grid_sum_q20(pad->work.frame.q28));
   }
   if (state->frames == 0) {
     if (state->part++ == 0) {

@@ -1,20 +1,20 @@
-/* Which model it is, and what follows for places, forces and directions. */
+/* Chooses the model, and computes locations, forces and directions from it. */
 #include "fit/fit_grid_solve.h"
 #include "fit/fit_math.h"
 #include "fit/fit_shapes_parts.h"
 
 #include <math.h>
 
-#define PULL_SURE 2.83f     /* standard deviations: what pulls less is round */
-#define EDGE_SURE 0.5f      /* standard deviations by which a line is longer than the shortest edge */
-#define PULL_MODEL_SD 0.04f /* pitches^2 per Q / F: variance along a line by what the model of a pull is off by */
+#define TANGENTIAL_SDS 2.83f      /* standard deviations: less is round */
+#define EDGE_SDS 0.5f             /* standard deviations by which a line is longer than the shortest edge */
+#define TANGENTIAL_MODEL_SD 0.04f /* pitches^2 per Q / F: variance along a line by the error of the tangential model */
 #define THIRD_Q16 21845
-#define LEAST_VARIANCE_Q20 (ONE_Q20 / 24) /* of a line of 0.7 pitches: shorter ones are no edges */
-#define SEPARATION_HALF_Q10 256           /* of half a pitch: nearer pairs are long contacts */
-#define BESIDE_Q20 (1 << 19)              /* half a pitch */
-#define SQUARE 3                          /* half a square's side, squared, over its spread */
-#define BALL 20                           /* radius of a ball whose contact's is half of it, squared, over its spread */
-#define LONGEST_HALF_Q10 1408             /* of 11/4 pitches: a longer line is rarer than a pair of balls */
+#define VARIANCE_MIN_Q20 (ONE_Q20 / 24) /* of a line of 0.7 pitches: shorter ones are no edges */
+#define SEPARATION_HALF_Q10 256         /* of half a pitch: nearer pairs are long contacts */
+#define OUTSIDE_Q20 (1 << 19)           /* half a pitch */
+#define SQUARE 3                        /* half a square's side, squared, over its spread */
+#define BALL 20                         /* radius of a ball whose contact's is half of it, squared, over its spread */
+#define LONGEST_HALF_Q10 1408           /* of 11/4 pitches: a longer line is rarer than a pair of balls */
 
 /* Variance of a sum of the unknowns times these, each at most some pitches or units of the readings. */
 static NOINLINE struct scaled variance_of_sum(const struct fit_shapes_equations *equations, const int32_t *by_q20) {
@@ -67,11 +67,11 @@ static NOINLINE void put_two(const struct fit_shapes_pad *pad, const struct fit_
   for (int c = 0; c < 2; c++) {
     int32_t sign = (c == 0) == (at[BALANCE] >= 0) ? 1 : -1;
     int32_t share_q20 = (ONE_Q20 + sign * at[BALANCE]) / 2;
-    result->x_mm[c] = mm(pad, pad->origin_x_q20 + at[PLACE_X] + sign * at[SPAN_X]);
-    result->y_mm[c] = mm(pad, pad->origin_y_q20 + at[PLACE_Y] + sign * at[SPAN_Y]);
+    result->x_mm[c] = mm(pad, pad->origin_x_q20 + at[LOCATION_X] + sign * at[SPAN_X]);
+    result->y_mm[c] = mm(pad, pad->origin_y_q20 + at[LOCATION_Y] + sign * at[SPAN_Y]);
     result->force_N[c] = product_of(scales->unit, scaled_mul(fit_scaled_from(at[AMPLITUDE], -20), fit_scaled_from(share_q20, -20)));
-    struct scaled place = scaled_add(variance_of(equations, PLACE_X, ONE_Q20, SPAN_X, sign * ONE_Q20),
-                                     variance_of(equations, PLACE_Y, ONE_Q20, SPAN_Y, sign * ONE_Q20));
+    struct scaled place = scaled_add(variance_of(equations, LOCATION_X, ONE_Q20, SPAN_X, sign * ONE_Q20),
+                                     variance_of(equations, LOCATION_Y, ONE_Q20, SPAN_Y, sign * ONE_Q20));
     result->location_sd_mm[c] = sd_of(scales->pitch, place, scales->variance);
     struct scaled force = variance_of(equations, AMPLITUDE, share_q20, BALANCE, sign * (at[AMPLITUDE] >> 1));
     result->force_sd_N[c] = sd_of(scales->unit, force, scales->variance);
@@ -87,38 +87,38 @@ static NOINLINE float sd_of_both(const struct fit_shapes_equations *equations, i
 
 /* Along an edge the contact's variance is larger than across, by that of a line. */
 static NOINLINE bool is_edge(const struct fit_shapes_equations *equations, const struct fit_shapes_at *at, const struct scales *scales,
-                             float pull_sd) {
+                             float tangential_sd) {
   int32_t more_q20 = fixed_mul_16(fit_shapes_span_square(at->value), THIRD_Q16) - at->value[SPREAD];
   int32_t by_q20[UNKNOWNS] = {[SPREAD] = -ONE_Q20};
   by_q20[SPAN_X] = 2 * fixed_mul_16(at->value[SPAN_X], THIRD_Q16);
   by_q20[SPAN_Y] = 2 * fixed_mul_16(at->value[SPAN_Y], THIRD_Q16);
   float sd = sd_of(ONE, variance_of_sum(equations, by_q20), scales->variance);
-  return fit_float(more_q20 - LEAST_VARIANCE_Q20, -20) > EDGE_SURE * fit_quadrature(1.0f, sd, 1.0f, pull_sd);
+  return fit_float(more_q20 - VARIANCE_MIN_Q20, -20) > EDGE_SDS * fit_quadrature(1.0f, sd, 1.0f, tangential_sd);
 }
 
-static NOINLINE void put_edge(const struct fit_shapes_equations *equations, const int32_t *at, const struct scales *scales, float pull_sd,
-                              struct fit_shapes_result *result) {
+static NOINLINE void put_edge(const struct fit_shapes_equations *equations, const int32_t *at, const struct scales *scales,
+                              float tangential_sd, struct fit_shapes_result *result) {
   float x = fit_float(at[SPAN_X], -20), y = fit_float(at[SPAN_Y], -20);
   float reach = fit_quadrature(1.0f, fabsf(x), 1.0f, fabsf(y)), per = 1.0f / reach, along = x < 0.0f ? -per : per;
   result->length_mm = 2.0f * fit_scaled_float(scales->pitch) * reach;
   result->along_x = along * x;
   result->along_y = along * y;
   struct scaled across = variance_of(equations, SPAN_X, fit_fixed(-result->along_y, 20), SPAN_Y, fit_fixed(result->along_x, 20));
-  result->angle_sd_rad = fit_quadrature(per, sd_of(ONE, across, scales->variance), 3.0f * per * per, pull_sd);
+  result->angle_sd_rad = fit_quadrature(per, sd_of(ONE, across, scales->variance), 3.0f * per * per, tangential_sd);
 }
 
-/* Of one contact: whether it is long, or else pulled. */
-static NOINLINE void put_kind(const struct fit_shapes_equations *equations, const struct fit_shapes_at *at, bool is_long,
-                              const struct scales *scales, struct fit_shapes_result *result) {
-  const int pull = equations->pull;
-  float x = fit_float(at->value[pull], -20), y = fit_float(at->value[pull + 1], -20);
+/* For one contact: whether it is long, or else under a tangential force. */
+static NOINLINE void put_shape(const struct fit_shapes_equations *equations, const struct fit_shapes_at *at, bool is_long,
+                               const struct scales *scales, struct fit_shapes_result *result) {
+  const int tangential = equations->tangential;
+  float x = fit_float(at->value[tangential], -20), y = fit_float(at->value[tangential + 1], -20);
   float size = fit_quadrature(1.0f, fabsf(x), 1.0f, fabsf(y)), unit_N = fit_scaled_float(scales->unit);
-  float pull_sd = PULL_MODEL_SD * size / fit_float(at->value[AMPLITUDE], -20);
-  if (is_long && is_edge(equations, at, scales, pull_sd)) {
+  float tangential_sd = TANGENTIAL_MODEL_SD * size / fit_float(at->value[AMPLITUDE], -20);
+  if (is_long && is_edge(equations, at, scales, tangential_sd)) {
     result->shape = FIT_SHAPE_ELONGATED;
-    put_edge(equations, at->value, scales, pull_sd, result);
-  } else if (size > PULL_SURE * sd_of_both(equations, pull, scales)) {
-    result->shape = FIT_SHAPE_PULLED;
+    put_edge(equations, at->value, scales, tangential_sd, result);
+  } else if (size > TANGENTIAL_SDS * sd_of_both(equations, tangential, scales)) {
+    result->shape = FIT_SHAPE_TANGENTIAL;
   } else {
     return;
   }
@@ -128,10 +128,10 @@ static NOINLINE void put_kind(const struct fit_shapes_equations *equations, cons
 
 static NOINLINE void put_one(const struct fit_shapes_pad *pad, const struct fit_shapes_equations *equations, const int32_t *at,
                              const struct scales *scales, struct fit_shapes_result *result) {
-  result->x_mm[0] = mm(pad, pad->origin_x_q20 + at[PLACE_X]);
-  result->y_mm[0] = mm(pad, pad->origin_y_q20 + at[PLACE_Y]);
+  result->x_mm[0] = mm(pad, pad->origin_x_q20 + at[LOCATION_X]);
+  result->y_mm[0] = mm(pad, pad->origin_y_q20 + at[LOCATION_Y]);
   result->force_N[0] = product_of(scales->unit, fit_scaled_from(at[AMPLITUDE], -20));
-  result->location_sd_mm[0] = fit_scaled_float(scales->pitch) * sd_of_both(equations, PLACE_X, scales);
+  result->location_sd_mm[0] = fit_scaled_float(scales->pitch) * sd_of_both(equations, LOCATION_X, scales);
   result->force_sd_N[0] = sd_of(scales->unit, variance_of(equations, AMPLITUDE, ONE_Q20, FAR, 0), scales->variance);
 }
 
@@ -147,14 +147,14 @@ static bool explains_as_well(int32_t chi_square_q8, int32_t than_q8) {
   return chi_square_q8 - than_q8 < (than_q8 + (FIT_SHAPES_ERRORS << 8)) >> 3;
 }
 
-/* Two contacts are apart and do not overlap, and both are on the array or hardly beside it. A pair that is otherwise explains a wide
- * contact, or what the models of a pull are off by. Of squares, discs (4) and balls (5), squares of the same spread overlap last. */
+/* Two contacts are apart, do not overlap, and are at most OUTSIDE beyond the array. Other pairs explain a wide contact, or the error of the
+ * tangential model. Of squares, discs (4) and balls (5), squares of the same spread overlap last. */
 static bool can_be_two(const struct fit_shapes_at *pair) {
   const int32_t *at = pair->value, square_q20 = fit_shapes_span_square(at);
-  int32_t reach_x = (int32_t)(fixed_size(at[PLACE_X] - MIDDLE_OF(COLUMNS)) + fixed_size(at[SPAN_X]));
-  int32_t reach_y = (int32_t)(fixed_size(at[PLACE_Y] - MIDDLE_OF(ROWS)) + fixed_size(at[SPAN_Y]));
+  int32_t reach_x = (int32_t)(fixed_magnitude(at[LOCATION_X] - MIDDLE_OF(COLUMNS)) + fixed_magnitude(at[SPAN_X]));
+  int32_t reach_y = (int32_t)(fixed_magnitude(at[LOCATION_Y] - MIDDLE_OF(ROWS)) + fixed_magnitude(at[SPAN_Y]));
   return square_q20 > SEPARATION_HALF_Q10 * SEPARATION_HALF_Q10 && square_q20 > SQUARE * at[SPREAD] &&
-         reach_x < (COLUMNS - 1) * (ONE_Q20 / 2) + BESIDE_Q20 && reach_y < (ROWS - 1) * (ONE_Q20 / 2) + BESIDE_Q20;
+         reach_x < (COLUMNS - 1) * (ONE_Q20 / 2) + OUTSIDE_Q20 && reach_y < (ROWS - 1) * (ONE_Q20 / 2) + OUTSIDE_Q20;
 }
 
 int fit_shapes_best(const int32_t *chi_square_q8, const struct fit_shapes_at *at) {
@@ -169,16 +169,16 @@ int fit_shapes_best(const int32_t *chi_square_q8, const struct fit_shapes_at *at
 }
 
 /* The middle of a model's forces. */
-static void put_middle(int model, const int32_t *at, int32_t middle_q20[2]) {
+static void find_middle(int model, const int32_t *at, int32_t middle_q20[2]) {
   int32_t balance_q14 = model == TWO ? at[BALANCE] >> 6 : 0;
-  middle_q20[0] = at[PLACE_X] + fixed_mul_16(at[SPAN_X], balance_q14) * 4;
-  middle_q20[1] = at[PLACE_Y] + fixed_mul_16(at[SPAN_Y], balance_q14) * 4;
+  middle_q20[0] = at[LOCATION_X] + fixed_mul_16(at[SPAN_X], balance_q14) * 4;
+  middle_q20[1] = at[LOCATION_Y] + fixed_mul_16(at[SPAN_Y], balance_q14) * 4;
 }
 
-/* The other models may be right: how far their middles are, by how likely they are, adds to the errors of the places.
- * Where chi^2 is above FIT_SHAPES_ERRORS none of the models may be, and the errors grow with it. */
-static void doubt_places(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8, const struct fit_shapes_state *state,
-                         struct fit_shapes_result *result) {
+/* The other models may be right: adds the distances of their middles, by their likelihoods. Above FIT_SHAPES_ERRORS none of the models may
+ * be right, and the standard deviations grow with chi^2. */
+static void add_model_uncertainty(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8,
+                                  const struct fit_shapes_state *state, struct fit_shapes_result *result) {
   float total = 1.0f, square_mm2[2] = {0.0f, 0.0f};
   for (int m = 0; m < MODELS; m++) {
     int32_t middle_q20[2];
@@ -191,7 +191,7 @@ static void doubt_places(const struct fit_shapes_pad *pad, int best, const int32
     likely *= likely;
     likely *= likely;
     likely *= likely;
-    put_middle(m, state->at[m].value, middle_q20);
+    find_middle(m, state->at[m].value, middle_q20);
     total += likely;
     for (int c = 0; c < (best == TWO ? 2 : 1); c++) {
       float x_mm = mm(pad, pad->origin_x_q20 + middle_q20[0]) - result->x_mm[c];
@@ -208,15 +208,15 @@ static void doubt_places(const struct fit_shapes_pad *pad, int best, const int32
 
 void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32_t *chi_square_q8, const struct fit_shapes_state *state,
                          struct fit_shapes_result *result) {
-  const struct fit_shapes_equations *equations = &pad->room.equations[best];
+  const struct fit_shapes_equations *equations = &pad->work.equations[best];
   const struct fit_shapes_at *at = &state->at[best];
-  struct scaled base = fit_scaled_from(pad->room.frame.base_q22, -22);
+  struct scaled base = fit_scaled_from(pad->work.frame.base_q22, -22);
   struct scaled variance = scaled_mul(base, base);
-  if (chi_square_q8[best] > FREEDOM << 8) {
-    variance = scaled_mul(variance, fit_scaled_from(port_divide(chi_square_q8[best], FREEDOM), -8));
+  if (chi_square_q8[best] > DEGREES_OF_FREEDOM << 8) {
+    variance = scaled_mul(variance, fit_scaled_from(port_divide(chi_square_q8[best], DEGREES_OF_FREEDOM), -8));
   }
   struct scaled unit = fit_grid_scaled(pad->force_unit_N);
-  unit.exponent += 18 - pad->room.frame.shift;
+  unit.exponent += 18 - pad->work.frame.shift;
   const struct scales scales = {unit, fit_scaled_short(variance), fit_grid_scaled(pad->pitch_mm)};
   if (best == TWO) {
     result->shape = FIT_SHAPE_TWO;
@@ -225,7 +225,7 @@ void fit_shapes_conclude(const struct fit_shapes_pad *pad, int best, const int32
     result->shape = FIT_SHAPE_ROUND;
     put_one(pad, equations, at->value, &scales, result);
     bool is_long = best == LONG && explains_more(chi_square_q8[LONG], chi_square_q8[ROUND], BY_A_HALF);
-    put_kind(equations, at, is_long, &scales, result);
+    put_shape(equations, at, is_long, &scales, result);
   }
-  doubt_places(pad, best, chi_square_q8, state, result);
+  add_model_uncertainty(pad, best, chi_square_q8, state, result);
 }

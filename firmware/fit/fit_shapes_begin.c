@@ -11,7 +11,7 @@ static int32_t pitches_q20(float pitches) { return fixed_clamp(fit_fixed(pitches
 
 /* Under the largest reading, and where it leaves most. */
 static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad, struct fit_shapes_at *at) {
-  const struct fit_shapes_frame *readings = &pad->room.frame;
+  const struct fit_shapes_frame *readings = &pad->work.frame;
   int first = 0, second = -1;
   int32_t most = 0;
   struct terms terms;
@@ -21,10 +21,10 @@ static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad, stru
   }
   int32_t height_q14 = terms.h_q14[0] + terms.h_q14[1], peak_q14 = port_divide(readings->q14[first] << 14, height_q14);
   struct squares squares;
-  struct bell narrow, wide;
+  struct axis_gaussians narrow, wide;
   fit_shapes_set_squares((first / ROWS - COLUMNS / 2) * 4096, (first % ROWS - ROWS / 2) * 4096, &squares);
-  fit_shapes_set_bell(&squares, terms.k_q24[0], &narrow);
-  fit_shapes_set_bell(&squares, terms.k_q24[1], &wide);
+  fit_shapes_set_gaussians(&squares, terms.k_q24[0], &narrow);
+  fit_shapes_set_gaussians(&squares, terms.k_q24[1], &wide);
   for (int k = 0; k < NODES; k++) {
     int32_t e_q15 = (narrow.x_q15[k / ROWS] * narrow.y_q15[k % ROWS]) >> 15;
     int32_t wide_q15 = (wide.x_q15[k / ROWS] * wide.y_q15[k % ROWS]) >> 15;
@@ -40,8 +40,8 @@ static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad, stru
   }
   int32_t both = readings->q14[first] + most;
   at->value[AMPLITUDE] = fixed_clamp(port_divide(both << 14, height_q14), 0, AMPLITUDE_MAX >> 6) << 6;
-  at->value[PLACE_X] = (first / ROWS + second / ROWS - 2 * (COLUMNS / 2)) * (ONE_Q20 / 2);
-  at->value[PLACE_Y] = (first % ROWS + second % ROWS - 2 * (ROWS / 2)) * (ONE_Q20 / 2);
+  at->value[LOCATION_X] = (first / ROWS + second / ROWS - 2 * (COLUMNS / 2)) * (ONE_Q20 / 2);
+  at->value[LOCATION_Y] = (first % ROWS + second % ROWS - 2 * (ROWS / 2)) * (ONE_Q20 / 2);
   at->value[SPAN_X] = (first / ROWS - second / ROWS) * (ONE_Q20 / 2);
   at->value[SPAN_Y] = (first % ROWS - second % ROWS) * (ONE_Q20 / 2);
   at->value[BALANCE] = port_divide((readings->q14[first] - most) << 14, both) << 6;
@@ -49,11 +49,11 @@ static NOINLINE void set_pair_by_readings(const struct fit_shapes_pad *pad, stru
 
 /* Sum of the squares of a pair's residuals, Q16: one with a good start has less. */
 static NOINLINE int32_t residuals_at(struct fit_shapes_pad *pad, struct fit_shapes_at *at) {
-  fit_shapes_round_places(at);
-  fit_shapes_set_rows(pad, TWO, SPAN_X, at, pad->room.equations);
+  fit_shapes_round_locations(at);
+  fit_shapes_set_rows(pad, TWO, SPAN_X, at, pad->work.equations);
   int32_t sum_q16 = 0;
   for (int k = 0; k < NODES; k++) {
-    int32_t residual_q13 = pad->room.row[k][RESIDUAL] >> 15;
+    int32_t residual_q13 = pad->work.row[k][RESIDUAL] >> 15;
     sum_q16 += (residual_q13 * residual_q13) >> 10;
   }
   return sum_q16;
@@ -82,11 +82,11 @@ void fit_shapes_begin(const struct fit_shapes_pad *pad, const struct fit_result 
   float x = fit->x_mm * per - fit_float(pad->origin_x_q20, -20);
   float y = fit->y_mm * per - fit_float(pad->origin_y_q20, -20);
   struct scaled amplitude = fit_grid_scaled(fit->force_N / (1.0753f * pad->force_unit_N));
-  amplitude.exponent += pad->room.frame.shift - 18;
-  at.value[AMPLITUDE] = fixed_clamp(fit_scaled_to_fixed(amplitude, 20), AMPLITUDE_LEAST, AMPLITUDE_MAX);
+  amplitude.exponent += pad->work.frame.shift - 18;
+  at.value[AMPLITUDE] = fixed_clamp(fit_scaled_to_fixed(amplitude, 20), AMPLITUDE_MIN, AMPLITUDE_MAX);
   at.value[SPREAD] = fit_fixed(spread, 20);
-  at.value[PLACE_X] = pitches_q20(x);
-  at.value[PLACE_Y] = pitches_q20(y);
+  at.value[LOCATION_X] = pitches_q20(x);
+  at.value[LOCATION_Y] = pitches_q20(y);
   state->at[ROUND] = at;
   float reach = sqrtf(excess);
   float line = fminf(1.7320508f * reach, 1.4f);

@@ -33,15 +33,15 @@ enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_arra
   }
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
     float sd = profile->tangential[j].sd_mm * per;
-    pad->pull_variance_q26[j] = q26_from(sd * sd);
-    pad->pull_strength_q26[j] = q26_from(profile->tangential[j].moment_mm * per * V);
+    pad->tangential_variance_q26[j] = q26_from(sd * sd);
+    pad->tangential_strength_q26[j] = q26_from(profile->tangential[j].moment_mm * per * V);
   }
   pad->far_k_q24 = fit_fixed(LOG2E_HALF_FLOAT / (FAR_WIDTHS * V), 24);
   pad->spread_q20 = fit_fixed(profile->spread_mm2 * per_square, 20);
   int32_t per_sd_q4 = fit_fixed(1.0f / (profile->spread_sd_mm2 * per_square), 4);
   pad->per_spread_sd_q4 = per_sd_q4 < PER_SD_MAX_Q4 ? per_sd_q4 : PER_SD_MAX_Q4;
-  pad->spread_least_q20 = -(pad->variance_q26[0] >> 9); /* an eighth */
-  pad->spread_most_q20 = fit_fixed(0.75f * V, 20);
+  pad->spread_min_q20 = -(pad->variance_q26[0] >> 9); /* an eighth */
+  pad->spread_max_q20 = fit_fixed(0.75f * V, 20);
   fit_use_rectangle(&array->grid);
   uint8_t origin = array->grid.sensor[COLUMNS / 2 * ROWS + ROWS / 2];
   pad->pitch_mm = array->pitch_mm;
@@ -67,16 +67,16 @@ void fit_shapes_set_terms(const struct fit_shapes_pad *pad, int32_t t_q20, struc
     terms->s_q8[j] = port_divide(terms->q_q12[j] << 14, v_q26 >> 8);
     heights += terms->h_q14[j];
   }
-  terms->dip_q14 = fixed_mul_16(pad->room.frame.dip_share_q16, heights);
-  terms->dip_k_q24 = pad->room.frame.dip_k_q24;
+  terms->dip_q14 = fixed_mul_16(pad->work.frame.dip_share_q16, heights);
+  terms->dip_k_q24 = pad->work.frame.dip_k_q24;
 }
 
-static void set_pull_terms(const struct fit_shapes_pad *pad, int32_t t_q20, struct terms *terms) {
+static void set_tangential_terms(const struct fit_shapes_pad *pad, int32_t t_q20, struct terms *terms) {
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
-    int32_t v_q26 = pad->pull_variance_q26[j] + fixed_mul_16(t_q20 * 64, KAPPA_Q14) * 4;
-    int32_t over_q26 = fixed_div_q26(pad->pull_strength_q26[j] >> 2, v_q26 >> 2);
-    terms->pull_k_q24[j] = fixed_div_q26(LOG2E_HALF_Q26 >> 2, v_q26 >> 2) >> 2;
-    terms->pull_q12[j] = fixed_div_q26(over_q26 >> 2, v_q26 >> 2) >> 14;
+    int32_t v_q26 = pad->tangential_variance_q26[j] + fixed_mul_16(t_q20 * 64, KAPPA_Q14) * 4;
+    int32_t over_q26 = fixed_div_q26(pad->tangential_strength_q26[j] >> 2, v_q26 >> 2);
+    terms->tangential_k_q24[j] = fixed_div_q26(LOG2E_HALF_Q26 >> 2, v_q26 >> 2) >> 2;
+    terms->tangential_q12[j] = fixed_div_q26(over_q26 >> 2, v_q26 >> 2) >> 14;
   }
 }
 
@@ -92,8 +92,8 @@ static int set_blobs(int model, const int32_t *at, struct blob *blob) {
       blob[b].weight_q14 = model == ROUND ? 1 << 14 : weight_q14[b];
       blob[b].lever_q14 = lever_q14[b];
     }
-    blob[b].x_q12 = at[PLACE_X] >> 8;
-    blob[b].y_q12 = at[PLACE_Y] >> 8;
+    blob[b].x_q12 = at[LOCATION_X] >> 8;
+    blob[b].y_q12 = at[LOCATION_Y] >> 8;
     if (model != ROUND) {
       blob[b].x_q12 += ((at[SPAN_X] >> 8) * blob[b].lever_q14) >> 14;
       blob[b].y_q12 += ((at[SPAN_Y] >> 8) * blob[b].lever_q14) >> 14;
@@ -113,52 +113,55 @@ void fit_shapes_set_squares(int32_t x_q12, int32_t y_q12, struct squares *square
   }
 }
 
-FIXED_INLINE void set_bell(const struct squares *squares, int32_t k_q24, int32_t (*power)(uint32_t), struct bell *bell) {
+FIXED_INLINE void set_factors(const struct squares *squares, int32_t k_q24, int32_t (*power)(uint32_t),
+                              struct axis_gaussians *axis_gaussians) {
   for (int i = 0; i < COLUMNS; i++) {
-    bell->x_q15[i] = power((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24)) >> 15;
+    axis_gaussians->x_q15[i] = power((uint32_t)fixed_mul_q26(squares->x_q24[i], k_q24)) >> 15;
   }
   for (int k = 0; k < ROWS; k++) {
-    bell->y_q15[k] = power((uint32_t)fixed_mul_q26(squares->y_q24[k], k_q24)) >> 15;
+    axis_gaussians->y_q15[k] = power((uint32_t)fixed_mul_q26(squares->y_q24[k], k_q24)) >> 15;
   }
 }
 
-void fit_shapes_set_bell(const struct squares *squares, int32_t k_q24, struct bell *bell) { set_bell(squares, k_q24, exp2_negative, bell); }
+void fit_shapes_set_gaussians(const struct squares *squares, int32_t k_q24, struct axis_gaussians *axis_gaussians) {
+  set_factors(squares, k_q24, exp2_negative, axis_gaussians);
+}
 
 /* The same within 0.6 %, for what is little. */
-static NOINLINE void set_rough_bell(const struct squares *squares, int32_t k_q24, struct bell *bell) {
-  set_bell(squares, k_q24, exp2_rough, bell);
+static NOINLINE void set_rough_gaussians(const struct squares *squares, int32_t k_q24, struct axis_gaussians *axis_gaussians) {
+  set_factors(squares, k_q24, exp2_rough, axis_gaussians);
 }
 
 /* Begins the rows: the readings, and the broad term about the middle, of a pair about both. */
 static NOINLINE void set_far(struct fit_shapes_pad *pad, int model, const struct blob *blob, const int32_t *at) {
   struct squares squares;
-  struct bell bell, other;
+  struct axis_gaussians axis_gaussians, other;
   const int32_t k_q24 = pad->far_k_q24;
   int32_t first_q13 = at[AMPLITUDE] >> 7, second_q13 = 0;
-  int32_t x_q12 = at[PLACE_X] >> 8, y_q12 = at[PLACE_Y] >> 8;
+  int32_t x_q12 = at[LOCATION_X] >> 8, y_q12 = at[LOCATION_Y] >> 8;
   if (model == TWO) {
     x_q12 = blob[0].x_q12;
     y_q12 = blob[0].y_q12;
   }
   fit_shapes_set_squares(x_q12, y_q12, &squares);
-  set_rough_bell(&squares, k_q24, &bell);
-  other = bell;
+  set_rough_gaussians(&squares, k_q24, &axis_gaussians);
+  other = axis_gaussians;
   if (model == TWO) {
     second_q13 = (first_q13 * blob[1].weight_q14) >> 14;
     first_q13 -= second_q13;
     fit_shapes_set_squares(blob[1].x_q12, blob[1].y_q12, &squares);
-    set_rough_bell(&squares, k_q24, &other);
+    set_rough_gaussians(&squares, k_q24, &other);
   }
   int32_t far_q16 = at[FAR] >> 4;
-  int32_t *row = pad->room.row[0];
-  const int32_t *reading_q28 = pad->room.frame.q28;
+  int32_t *row = pad->work.row[0];
+  const int32_t *reading_q28 = pad->work.frame.q28;
   for (int i = 0; i < COLUMNS; i++) {
-    int32_t x_q13 = (first_q13 * bell.x_q15[i]) >> 15;
+    int32_t x_q13 = (first_q13 * axis_gaussians.x_q15[i]) >> 15;
     int32_t other_x_q13 = (second_q13 * other.x_q15[i]) >> 15;
     for (int k = 0; k < ROWS; k++, row += UNKNOWNS + 1) {
-      row[AMPLITUDE] = row[PLACE_X] = row[PLACE_Y] = row[SPREAD] = 0;
+      row[AMPLITUDE] = row[LOCATION_X] = row[LOCATION_Y] = row[SPREAD] = 0;
       row[SPAN_X] = row[SPAN_Y] = row[BALANCE] = 0;
-      row[FAR] = (x_q13 * bell.y_q15[k] + other_x_q13 * other.y_q15[k]) >> 13;
+      row[FAR] = (x_q13 * axis_gaussians.y_q15[k] + other_x_q13 * other.y_q15[k]) >> 13;
       row[RESIDUAL] = *reading_q28++ - ((far_q16 * row[FAR]) >> 3);
     }
   }
@@ -168,15 +171,15 @@ static NOINLINE void set_far(struct fit_shapes_pad *pad, int model, const struct
 static NOINLINE void add_blob(struct fit_shapes_pad *pad, const struct terms *terms, int model, const struct blob *blob,
                               int32_t amplitude_q13) {
   struct squares squares;
-  struct bell narrow, wide, dip;
+  struct axis_gaussians narrow, wide, dip;
   fit_shapes_set_squares(blob->x_q12, blob->y_q12, &squares);
-  fit_shapes_set_bell(&squares, terms->k_q24[0], &narrow);
-  fit_shapes_set_bell(&squares, terms->k_q24[1], &wide);
-  set_rough_bell(&squares, terms->dip_k_q24, &dip);
+  fit_shapes_set_gaussians(&squares, terms->k_q24[0], &narrow);
+  fit_shapes_set_gaussians(&squares, terms->k_q24[1], &wide);
+  set_rough_gaussians(&squares, terms->dip_k_q24, &dip);
   int32_t a_q13 = (amplitude_q13 * blob->weight_q14) >> 14;
   int32_t half_q13 = blob->lever_q14 > 0 ? amplitude_q13 : -amplitude_q13;
-  const struct fit_own *own = pad->room.frame.has_own ? pad->room.own : NULL;
-  int32_t *row = pad->room.row[0];
+  const struct fit_deviation *deviation = pad->work.frame.has_deviations ? pad->work.deviations : NULL;
+  int32_t *row = pad->work.row[0];
   for (int i = 0; i < COLUMNS; i++) {
     int32_t dx_q12 = (i - COLUMNS / 2) * 4096 - blob->x_q12;
     for (int k = 0; k < ROWS; k++, row += UNKNOWNS + 1) {
@@ -195,13 +198,13 @@ static NOINLINE void add_blob(struct fit_shapes_pad *pad, const struct terms *te
       int32_t along_x = (((g_q12 * dx_q12) >> 12) * a_q13) >> 10;
       int32_t along_y = (((g_q12 * dy_q12) >> 12) * a_q13) >> 10;
       row[AMPLITUDE] += (s_q15 * blob->weight_q14) >> 14;
-      row[PLACE_X] += along_x;
-      row[PLACE_Y] += along_y;
+      row[LOCATION_X] += along_x;
+      row[LOCATION_Y] += along_y;
       row[SPREAD] += (((square_q10 * (w_q23 >> 15)) >> 7) - g_q12) * a_q13 >> 10;
       row[RESIDUAL] -= a_q13 * s_q15;
-      if (own) { /* the log of a width, times what moves the model with it */
+      if (deviation) { /* the log of a width, times what moves the model with it */
         int32_t grows_q15 = (((g_q12 * square_q10) >> 10) * a_q13) >> 10;
-        row[RESIDUAL] -= (grows_q15 >> 2) * own++->wider_q15;
+        row[RESIDUAL] -= (grows_q15 >> 2) * deviation++->wider_q15;
       }
       if (model != ROUND) {
         row[SPAN_X] += (along_x * (blob->lever_q14 >> 2)) >> 12;
@@ -214,30 +217,30 @@ static NOINLINE void add_blob(struct fit_shapes_pad *pad, const struct terms *te
   }
 }
 
-static NOINLINE void add_pull(struct fit_shapes_pad *pad, const struct terms *terms, const int32_t *at, int pull) {
+static NOINLINE void add_tangential(struct fit_shapes_pad *pad, const struct terms *terms, const int32_t *at, int tangential) {
   struct squares squares;
-  struct bell bell[PAD_TANGENTIAL_TERMS];
-  int32_t x_q12 = at[PLACE_X] >> 8, y_q12 = at[PLACE_Y] >> 8;
-  int32_t pull_x_q13 = at[pull] >> 7, pull_y_q13 = at[pull + 1] >> 7;
+  struct axis_gaussians axis_gaussians[PAD_TANGENTIAL_TERMS];
+  int32_t x_q12 = at[LOCATION_X] >> 8, y_q12 = at[LOCATION_Y] >> 8;
+  int32_t tangential_x_q13 = at[tangential] >> 7, tangential_y_q13 = at[tangential + 1] >> 7;
   fit_shapes_set_squares(x_q12, y_q12, &squares);
   for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
-    fit_shapes_set_bell(&squares, terms->pull_k_q24[j], &bell[j]);
+    fit_shapes_set_gaussians(&squares, terms->tangential_k_q24[j], &axis_gaussians[j]);
   }
-  int32_t *row = pad->room.row[0];
+  int32_t *row = pad->work.row[0];
   for (int i = 0; i < COLUMNS; i++) {
     for (int k = 0; k < ROWS; k++, row += UNKNOWNS + 1) {
       int32_t f_q27 = 0;
       for (int j = 0; j < PAD_TANGENTIAL_TERMS; j++) {
-        f_q27 += terms->pull_q12[j] * ((bell[j].x_q15[i] * bell[j].y_q15[k]) >> 15);
+        f_q27 += terms->tangential_q12[j] * ((axis_gaussians[j].x_q15[i] * axis_gaussians[j].y_q15[k]) >> 15);
       }
-      row[pull] = ((f_q27 >> 15) * ((i - COLUMNS / 2) * 4096 - x_q12)) >> 9;
-      row[pull + 1] = ((f_q27 >> 15) * ((k - ROWS / 2) * 4096 - y_q12)) >> 9;
-      row[RESIDUAL] -= row[pull] * pull_x_q13 + row[pull + 1] * pull_y_q13;
+      row[tangential] = ((f_q27 >> 15) * ((i - COLUMNS / 2) * 4096 - x_q12)) >> 9;
+      row[tangential + 1] = ((f_q27 >> 15) * ((k - ROWS / 2) * 4096 - y_q12)) >> 9;
+      row[RESIDUAL] -= row[tangential] * tangential_x_q13 + row[tangential + 1] * tangential_y_q13;
     }
   }
 }
 
-void fit_shapes_round_places(struct fit_shapes_at *at) {
+void fit_shapes_round_locations(struct fit_shapes_at *at) {
   for (int u = 0; u < UNKNOWNS; u++) {
     at->value[u] = (at->value[u] + 128) & ~255;
   }
@@ -246,35 +249,35 @@ void fit_shapes_round_places(struct fit_shapes_at *at) {
 void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count, const struct fit_shapes_at *where,
                          struct fit_shapes_equations *equations) {
   const int32_t *at = where->value;
-  const int pull = model == ROUND ? SPAN_X : PULL_X;
-  const bool pulls = count > pull && model != TWO;
+  const int tangential = model == ROUND ? SPAN_X : TANGENTIAL_X;
+  const bool pulls = count > tangential && model != TWO;
   struct terms terms;
   struct blob blob[4];
   fit_shapes_set_terms(pad, at[SPREAD], &terms);
   int blobs = set_blobs(model, at, blob);
   equations->count = count;
-  equations->pull = pulls ? pull : 0;
+  equations->tangential = pulls ? tangential : 0;
   set_far(pad, model, blob, at);
   for (int b = 0; b < blobs; b++) {
     add_blob(pad, &terms, model, &blob[b], at[AMPLITUDE] >> 7);
   }
   if (pulls) {
     int32_t line_q20 = model == LONG ? fixed_mul_16(fit_shapes_span_square(at), LINE_Q16) : 0;
-    set_pull_terms(pad, at[SPREAD] + line_q20, &terms);
-    add_pull(pad, &terms, at, pull);
+    set_tangential_terms(pad, at[SPREAD] + line_q20, &terms);
+    add_tangential(pad, &terms, at, tangential);
   }
   uint32_t size = 0;
-  int32_t *row = pad->room.row[0];
+  int32_t *row = pad->work.row[0];
   for (int k = 0; k < NODES; k++, row += UNKNOWNS + 1) {
     int32_t residual = row[RESIDUAL];
-    if (pad->room.frame.has_own) { /* what a sensor reads that is off its place */
-      const struct fit_own *own = &pad->room.own[k];
-      residual =
-          fixed_plus(residual, fixed_plus(fixed_times(row[PLACE_X] >> 2, own->off_x_q15), fixed_times(row[PLACE_Y] >> 2, own->off_y_q15)));
+    if (pad->work.frame.has_deviations) { /* what a sensor reads that is off its place */
+      const struct fit_deviation *deviation = &pad->work.deviations[k];
+      residual = wrap_add(
+          residual, wrap_add(wrap_mul(row[LOCATION_X] >> 2, deviation->off_x_q15), wrap_mul(row[LOCATION_Y] >> 2, deviation->off_y_q15)));
     }
-    residual = fixed_clamp(residual >> 12, -(1 << 17), 1 << 17) * pad->room.weight_q12[k];
+    residual = fixed_clamp(residual >> 12, -(1 << 17), 1 << 17) * pad->work.weight_q12[k];
     row[RESIDUAL] = residual;
-    size |= fixed_size(residual);
+    size |= fixed_magnitude(residual);
   }
   equations->residual_size = size;
 }

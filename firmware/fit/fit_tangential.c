@@ -10,9 +10,9 @@
 #define ELONGATION_SD_mm2 4.0f
 
 /* Factors of the stated variances by chi^2. NUMERICS.md has their reasons ("What the firmware does not report"). */
-#define MISFIT_SHIFT 5                /* chi^2 / 32, by the coverage of calibrated pads */
-#define MISFIT_LEAST_Q16 1311         /* 0.02 */
-#define MISFIT_LEAST_OUTSIDE_Q16 4588 /* 0.07: there a contact's shape moves its place, and the readings hardly show it */
+#define MISFIT_SHIFT 5              /* chi^2 / 32, by the coverage of calibrated pads */
+#define MISFIT_MIN_Q16 1311         /* 0.02 */
+#define MISFIT_MIN_OUTSIDE_Q16 4588 /* 0.07: there a contact's shape moves its place, and the readings hardly show it */
 
 /* Thickness of a layer in units of length: the widest term's sd is 0.478 of the thickness. On layers thinner than
  * the pitch standard deviations grow as (pitch / thickness)^2 (NUMERICS.md). */
@@ -20,8 +20,8 @@
 
 /* An elongation beyond this share of the widest term's variance is no report; all are taken where a pad ends nearer
  * than NEAR_ENDS of its thickness, which makes round contacts look long (report shear, elongated_false_percent). */
-#define LONG_MOST_Q15 2294 /* 0.07: a lime of 45 by 55 mm has up to that */
-#define LONG_MOST_NEAR_ENDS_Q15 8192
+#define ELONGATION_MAX_Q15 2294 /* 0.07: a lime of 45 by 55 mm has up to that */
+#define NEAR_ENDS_MAX_Q15 8192
 #define NEAR_ENDS 0.75f
 
 /* Larger where the pad ends near, which leaves residuals. */
@@ -38,15 +38,15 @@
 /* The Gaussian's place jitters more than the estimate's in the corners. */
 #define MOVED_NOISES 4
 /* Frames in a row without a report after which it starts again: one more than a contact at rest takes. */
-#define UNREPORTED_MOST 6
+#define UNREPORTED_MAX 6
 
-#define DIP_SD_LEAST_Q13 (1 << 11) /* the narrowest that a term may be */
-#define DIP_SD_MOST_Q13 (1 << 15)
+#define DIP_SD_MIN_Q13 (1 << 11) /* the narrowest that a term may be */
+#define DIP_SD_MAX_Q13 (1 << 15)
 
 static int32_t q26_from(float value) { return (int32_t)(value * 67108864.0f); }
 
-/* What the formats of the sums and of what is made of them carry; layers need 1.3, 9.5 and 97 of
- * the first three, and pads of 5 to 20 mm a pitch of 0.47 to 1.88 units of 4.8 to 19.1 mm. */
+/* Limits of the formats. Layers need 1.3, 9.5 and 97 of the first three; pads of 5 to 20 mm a pitch of 0.47 to 1.88 units of 4.8 to 19.1
+ * mm. */
 #define SUM_MAX_0 1.9f
 #define SUM_MAX_1 12.0f
 #define SUM_MAX_2 112.0f
@@ -56,7 +56,7 @@ static int32_t q26_from(float value) { return (int32_t)(value * 67108864.0f); }
 #define FORCE_UNIT_Q 40 /* 2^25 .. 2^30 */
 
 /* Whether the sums over these terms of strength V0 / v^i, i from first, stay below their limits for the most concentrated contact. */
-static bool is_carried(const struct fit_pad *pad, int from, int end, float t, bool pulls) {
+static bool fits_formats(const struct fit_pad *pad, int from, int end, float t, bool pulls) {
   float sums[3] = {0.0f, 0.0f, 0.0f};
   for (int j = from; j < end; j++) {
     float v = (float)pad->variance_q26[j] * (1.0f / 67108864.0f) + t;
@@ -98,26 +98,27 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, 
   pad->per_unit_q30 = (int32_t)(per_unit * 1073741824.0f);
   pad->origin_x_q24_mm = fit_fixed(array->x[origin] * array->pitch_mm, 24);
   pad->origin_y_q24_mm = fit_fixed(array->y[origin] * array->pitch_mm, 24);
-  pad->pitch_q26 = pitch_q12 * (1 << (26 - PLACE_Q));
+  pad->pitch_q26 = pitch_q12 * (1 << (26 - LOCATION_Q));
   pad->pitch_square_q26 = fixed_mul_q26(pad->pitch_q26, pad->pitch_q26);
   float spread = profile->spread_mm2 * per_square, spread_sd = profile->spread_sd_mm2 * per_square;
   pad->spread_q26 = q26_from(spread < VARIANCE_MAX ? spread : VARIANCE_MAX);
   pad->spread_sd_q26 = q26_from(spread_sd < VARIANCE_MAX ? spread_sd : VARIANCE_MAX);
-  pad->long_sd_q26 = q26_from(ELONGATION_SD_mm2 * per_square);
-  float height = 0.0f;
+  pad->elongation_sd_q26 = q26_from(ELONGATION_SD_mm2 * per_square);
+  float peak = 0.0f;
   for (int j = 0; j < PAD_NORMAL_TERMS; j++) {
-    height += (float)pad->strength_q26[j] * 0.25f / (float)(pad->variance_q26[j] + pad->spread_q26);
+    peak += (float)pad->strength_q26[j] * 0.25f / (float)(pad->variance_q26[j] + pad->spread_q26);
   }
-  pad->height_q26 = q26_from(height);
-  float least = (float)spread_least(pad) * (1.0f / 67108864.0f);
-  if (!is_carried(pad, 0, PAD_NORMAL_TERMS, least, false) || !is_carried(pad, PAD_NORMAL_TERMS, FIT_TANGENTIAL_TERMS, 1.3f * least, true)) {
+  pad->peak_q26 = q26_from(peak);
+  float least = (float)spread_min(pad) * (1.0f / 67108864.0f);
+  if (!fits_formats(pad, 0, PAD_NORMAL_TERMS, least, false) ||
+      !fits_formats(pad, PAD_NORMAL_TERMS, FIT_TANGENTIAL_TERMS, 1.3f * least, true)) {
     return FT_ERR_ARGUMENT;
   }
   float force_unit_N = 1.57079633e-6f * unit_mm * unit_mm; /* 2 pi V0, V0 = 1/4 */
   pad->force_unit = (struct scaled){fit_fixed(force_unit_N, FORCE_UNIT_Q), -FORCE_UNIT_Q};
   bool near_ends = profile->overhang_mm > 0.0f && profile->overhang_mm < NEAR_ENDS * profile->thickness_mm;
   pad->chi_square_max = near_ends ? CHI_SQUARE_MAX_NEAR_ENDS : CHI_SQUARE_MAX;
-  pad->long_most_q15 = near_ends ? LONG_MOST_NEAR_ENDS_Q15 : LONG_MOST_Q15;
+  pad->elongation_max_q15 = near_ends ? NEAR_ENDS_MAX_Q15 : ELONGATION_MAX_Q15;
   float thin = array->pitch_mm / (THICKNESS_PER_UNIT * unit_mm);
   thin *= thin;
   pad->thin = fit_grid_scaled(thin > 1.0f ? thin * thin : 1.0f);
@@ -127,9 +128,9 @@ enum ft_status fit_pad_init(struct fit_pad *pad, const struct fit_array *array, 
 
 /* False: too few sensors. */
 static bool weigh(const struct fit_array *array, const struct fit_settings *settings, sensor_map used, struct problem *problem,
-                  struct fit_tangential_room *room) {
+                  struct fit_tangential_work *work) {
   int sensors =
-      fit_grid_weigh(array, settings, used, &problem->readings, ONE_Q26 >> 5, problem->model_sd_q16, room->weight_q12, &problem->base);
+      fit_grid_weigh(array, settings, used, &problem->readings, ONE_Q26 >> 5, problem->model_sd_q16, work->weight_q12, &problem->base);
   problem->by_gains_q12 = sensors > 0 ? (1 << 12) - port_divide(problem->base.squares_q12, sensors) : 0;
   return sensors >= FIT_TANGENTIAL_SENSORS;
 }
@@ -143,29 +144,29 @@ NOINLINE static void set_from_fit(const struct fit_pad *pad, const struct fit_re
   at->y_q26 = fixed_clamp(at->y_q26, -reach(pad, ROWS), reach(pad, ROWS));
   int32_t sigma_q26 = product(fit_fixed(fit->sigma_mm, 24), pad->per_unit_q30, 28);
   sigma_q26 = fixed_clamp(sigma_q26, 0, 2 * ONE_Q26);
-  at->t_q26 = fixed_clamp(fixed_mul_q26(sigma_q26, sigma_q26) - GAUSSIAN_VARIANCE_Q26, spread_least(pad), SPREAD_MOST_Q26);
-  at->e1_q26 = at->e2_q26 = at->pull_x_q24 = at->pull_y_q24 = 0;
+  at->t_q26 = fixed_clamp(fixed_mul_q26(sigma_q26, sigma_q26) - GAUSSIAN_VARIANCE_Q26, spread_min(pad), SPREAD_MAX_Q26);
+  at->e1_q26 = at->e2_q26 = at->tangential_x_q24 = at->tangential_y_q24 = 0;
   struct scaled amplitude = scaled_mul(fit_grid_scaled(fit->force_N), pad->per_force);
   amplitude.exponent += shift - 18;
   at->amplitude_q24 = fixed_clamp(fit_scaled_to_fixed(amplitude, 24), 1 << 18, AMPLITUDE_MAX_Q24);
 }
 
 /* Of 2^bits. */
-static int32_t to_multiple(int32_t value, int bits) { return rounded(value, bits) * (1 << bits); }
+static int32_t round_to(int32_t value, int bits) { return rounded(value, bits) * (1 << bits); }
 
-static int32_t in_proportion(int32_t value, int32_t share_q13, int32_t most) {
+static int32_t scale_by(int32_t value, int32_t share_q13, int32_t most) {
   return fixed_clamp(scaled_by(value, share_q13, 13), -most, most);
 }
 
-/* Where the estimate begins: at the Gaussian's, or where the last frame's ended, moved as the
- * Gaussian has moved, unless its noise may have done that, and in proportion to the readings. */
+/* Start of the step: the Gaussian's place in a new contact. Else the end of the frame before, scaled as the readings, and moved as the
+ * Gaussian if that is more than its noise. */
 NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_state *state, const struct fit_tangential_unknowns *fit,
                            int32_t noise_q26, int32_t sum_q20) {
   struct fit_tangential_unknowns *at = &state->at;
   int32_t before = state->sum_q20;
   int32_t dx_q26 = fit->x_q26 - state->fit_x_q26, dy_q26 = fit->y_q26 - state->fit_y_q26;
-  uint32_t moved_q26 = fixed_size(dx_q26) + fixed_size(dy_q26);
-  bool other = fit_is_another(sum_q20, before);
+  uint32_t moved_q26 = fixed_magnitude(dx_q26) + fixed_magnitude(dy_q26);
+  bool other = fit_is_another_contact(sum_q20, before);
   if (state->steps == 0 || other) {
     *at = *fit;
   } else {
@@ -174,33 +175,33 @@ NOINLINE static void begin(const struct fit_pad *pad, struct fit_tangential_stat
       at->y_q26 = fixed_clamp(at->y_q26 + dy_q26, -reach(pad, ROWS), reach(pad, ROWS));
     }
     int32_t share_q13 = fixed_clamp(port_divide(sum_q20, before >> 13), 0, INT16_MAX);
-    at->amplitude_q24 = in_proportion(at->amplitude_q24, share_q13, AMPLITUDE_MAX_Q24);
+    at->amplitude_q24 = scale_by(at->amplitude_q24, share_q13, AMPLITUDE_MAX_Q24);
     at->amplitude_q24 = fixed_clamp(at->amplitude_q24, 1 << 16, AMPLITUDE_MAX_Q24);
-    at->pull_x_q24 = in_proportion(at->pull_x_q24, share_q13, PULL_MAX_Q24);
-    at->pull_y_q24 = in_proportion(at->pull_y_q24, share_q13, PULL_MAX_Q24);
-    at->e1_q26 = in_proportion(at->e1_q26, share_q13, LONG_MAX_Q26);
-    at->e2_q26 = in_proportion(at->e2_q26, share_q13, LONG_MAX_Q26);
+    at->tangential_x_q24 = scale_by(at->tangential_x_q24, share_q13, TANGENTIAL_MAX_Q24);
+    at->tangential_y_q24 = scale_by(at->tangential_y_q24, share_q13, TANGENTIAL_MAX_Q24);
+    at->e1_q26 = scale_by(at->e1_q26, share_q13, ELONGATION_MAX_Q26);
+    at->e2_q26 = scale_by(at->e2_q26, share_q13, ELONGATION_MAX_Q26);
   }
   if (other || moved_q26 > JUMP_Q26) {
     state->steps = 0;
   }
-  at->x_q26 = to_multiple(at->x_q26, 26 - PLACE_Q);
-  at->y_q26 = to_multiple(at->y_q26, 26 - PLACE_Q);
-  at->amplitude_q24 = to_multiple(at->amplitude_q24, 24 - HEIGHT_Q);
-  at->pull_x_q24 = to_multiple(at->pull_x_q24, 24 - HEIGHT_Q);
-  at->pull_y_q24 = to_multiple(at->pull_y_q24, 24 - HEIGHT_Q);
-  at->e1_q26 = to_multiple(at->e1_q26, 26 - LONG_Q);
-  at->e2_q26 = to_multiple(at->e2_q26, 26 - LONG_Q);
+  at->x_q26 = round_to(at->x_q26, 26 - LOCATION_Q);
+  at->y_q26 = round_to(at->y_q26, 26 - LOCATION_Q);
+  at->amplitude_q24 = round_to(at->amplitude_q24, 24 - AMPLITUDE_Q);
+  at->tangential_x_q24 = round_to(at->tangential_x_q24, 24 - AMPLITUDE_Q);
+  at->tangential_y_q24 = round_to(at->tangential_y_q24, 24 - AMPLITUDE_Q);
+  at->e1_q26 = round_to(at->e1_q26, 26 - ELONGATION_Q);
+  at->e2_q26 = round_to(at->e2_q26, 26 - ELONGATION_Q);
   state->fit_x_q26 = fit->x_q26;
   state->fit_y_q26 = fit->y_q26;
   state->sum_q20 = sum_q20;
 }
 
-/* How far the place moves for a change of Q / F along the same axis, if the other unknowns follow:
- * from its row of the inverse of L, 2^half of it. length: with the amplitude. */
-static int32_t moved_q20(const struct outcome *outcome, struct scaled length, int axis, int32_t with_pull_q8) {
-  int32_t q = outcome->column_q[PLACE_X + axis] - outcome->column_q[PULL_X + axis] - outcome->solution.half[PULL_X + axis] - 8;
-  return shifted(with_pull_q8 * length.mantissa, q + length.exponent + 20);
+/* Shift of the location per Q / F along the same axis, where the other unknowns follow; influence_q8: of variance_of. */
+static int32_t shift_q20(const struct outcome *outcome, struct scaled length, int axis, int32_t influence_q8) {
+  int32_t q =
+      outcome->column_q[LOCATION_X + axis] - outcome->column_q[TANGENTIAL_X + axis] - outcome->solution.half[TANGENTIAL_X + axis] - 8;
+  return shifted(influence_q8 * length.mantissa, q + length.exponent + 20);
 }
 
 static struct scaled root_of_product(struct scaled a, struct scaled b) { return fit_scaled_sqrt(scaled_mul(a, b)); }
@@ -208,13 +209,13 @@ static struct scaled root_of_product(struct scaled a, struct scaled b) { return 
 /* 1: it is within a quarter of a pitch of the outer sensors, or beyond; else 0. */
 FIXED_INLINE uint32_t is_outside(const struct fit_pad *pad, int32_t at_q26, int32_t nodes) {
   const int32_t from_middle_q26 = at_q26 + (nodes % 2 ? 0 : pad->pitch_q26 >> 1);
-  return ((uint32_t)(2 * nodes - 3) * (uint32_t)(pad->pitch_q26 >> 2) - fixed_size(from_middle_q26)) >> 31;
+  return ((uint32_t)(2 * nodes - 3) * (uint32_t)(pad->pitch_q26 >> 2) - fixed_magnitude(from_middle_q26)) >> 31;
 }
 
 NOINLINE static void conclude(const struct problem *problem, const struct fit_tangential_unknowns *at, const struct outcome *outcome,
                               struct fit_tangential *result) {
   const struct fit_pad *pad = problem->pad;
-  const struct fit_tangential_room *room = &pad->room;
+  const struct fit_tangential_work *work = &pad->work;
   struct scaled base = fit_scaled_from(problem->base.base_q22, -22);
   struct scaled variance = scaled_mul(base, base);
   int32_t chi_square_q16 = fit_scaled_to_fixed(scaled_div(outcome->misfit, variance), 16);
@@ -225,27 +226,27 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   struct scaled square = scaled_add(scaled_mul(e1, e1), scaled_mul(e2, e2));
   struct scaled amplitude = fit_scaled_from(at->amplitude_q24, -24);
   struct scaled round = scaled_mul(amplitude, fit_scaled_from(ONE_Q26 / 4 + at->t_q26, -26)); /* A v */
-  struct scaled longest = scaled_mul((struct scaled){pad->long_most_q15, -15}, round);
+  struct scaled longest = scaled_mul((struct scaled){pad->elongation_max_q15, -15}, round);
   longest = fit_scaled_short(longest);
   if (exceeds(square, scaled_mul(longest, longest))) {
     return;
   }
   const struct scaled stated = scaled_mul(variance, pad->thin);
   const uint32_t outside = is_outside(pad, at->x_q26, COLUMNS) + is_outside(pad, at->y_q26, ROWS);
-  const int32_t least_q16 = outside ? MISFIT_LEAST_OUTSIDE_Q16 : MISFIT_LEAST_Q16, misfit_q16 = chi_square_q16 >> MISFIT_SHIFT;
-  const int32_t factor_q16 = misfit_q16 < least_q16 ? least_q16 : misfit_q16, lacks_q16 = factor_q16 < 1 << 16 ? (1 << 16) - factor_q16 : 0;
-  /* Of the gains' part remains where chi^2 is small: of a tangential force half; of a location all, or none after a
-   * calibration, which leaves no errors that rise over the pad. */
-  const int32_t half_gains_q16 = (lacks_q16 * problem->by_gains_q12) >> 13;
-  struct scaled pull_variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(factor_q16 + half_gains_q16, -16)));
-  variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(problem->own ? factor_q16 : factor_q16 + 2 * half_gains_q16, -16)));
+  const int32_t least_q16 = outside ? MISFIT_MIN_OUTSIDE_Q16 : MISFIT_MIN_Q16, misfit_q16 = chi_square_q16 >> MISFIT_SHIFT;
+  const int32_t factor_q16 = misfit_q16 < least_q16 ? least_q16 : misfit_q16, rest_q16 = factor_q16 < 1 << 16 ? (1 << 16) - factor_q16 : 0;
+  /* Where chi^2 is small, half of the gains' part remains for a tangential force; for a location all, or none after a calibration. */
+  const int32_t gain_part_q16 = (rest_q16 * problem->by_gains_q12) >> 13;
+  struct scaled tangential_variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(factor_q16 + gain_part_q16, -16)));
+  variance = fit_scaled_short(scaled_mul(stated, fit_scaled_from(problem->deviations ? factor_q16 : factor_q16 + 2 * gain_part_q16, -16)));
   int32_t x_q8, y_q8;
-  struct scaled pulls = scaled_add(variance_of(room, outcome, PULL_X, 0, NULL), variance_of(room, outcome, PULL_Y, 0, NULL));
+  struct scaled pulls = scaled_add(variance_of(work, outcome, TANGENTIAL_X, 0, NULL), variance_of(work, outcome, TANGENTIAL_Y, 0, NULL));
   pulls.exponent -= 1;
-  struct scaled place = scaled_add(variance_of(room, outcome, PLACE_X, PULL_X, &x_q8), variance_of(room, outcome, PLACE_Y, PULL_Y, &y_q8));
-  struct scaled pull_sd = root_of_product(pulls, pull_variance);
+  struct scaled place =
+      scaled_add(variance_of(work, outcome, LOCATION_X, TANGENTIAL_X, &x_q8), variance_of(work, outcome, LOCATION_Y, TANGENTIAL_Y, &y_q8));
+  struct scaled tangential_sd = root_of_product(pulls, tangential_variance);
   const struct scaled most = {(int32_t)(FIT_TANGENTIAL_SD_MAX * 32768.0f), -15};
-  if (exceeds(pull_sd, scaled_mul(most, amplitude))) {
+  if (exceeds(tangential_sd, scaled_mul(most, amplitude))) {
     return;
   }
   int32_t exponent = pad->force_unit.exponent + 18 - problem->readings.shift;
@@ -256,34 +257,34 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   result->x_mm = fit_float(product(at->x_q26, pad->unit_q25_mm, 27) + pad->origin_x_q24_mm, -24);
   result->y_mm = fit_float(product(at->y_q26, pad->unit_q25_mm, 27) + pad->origin_y_q24_mm, -24);
   result->force_N = fit_float(product(at->amplitude_q24 * 16, unit_q30, 32), exponent + 4);
-  result->qx_N = fit_float(product(at->pull_x_q24 * 32, unit_q30, 32), exponent + 3);
-  result->qy_N = fit_float(product(at->pull_y_q24 * 32, unit_q30, 32), exponent + 3);
-  result->q_sd_N = fit_scaled_float(scaled_mul(unit, pull_sd));
+  result->qx_N = fit_float(product(at->tangential_x_q24 * 32, unit_q30, 32), exponent + 3);
+  result->qy_N = fit_float(product(at->tangential_y_q24 * 32, unit_q30, 32), exponent + 3);
+  result->q_sd_N = fit_scaled_float(scaled_mul(unit, tangential_sd));
   result->location_sd_mm = fit_scaled_float(scaled_mul(length, root_of_product(place, variance)));
   struct scaled noise = fit_scaled_from(problem->base.noise_q22, -22);
   result->location_noise_mm = fit_scaled_float(scaled_mul(length, scaled_mul(noise, fit_scaled_sqrt(place))));
-  result->variance_per_pull = fit_scaled_float(scaled_div(variance, pull_variance));
-  struct scaled height = variance_of(room, outcome, AMPLITUDE, 0, NULL);
-  result->force_sd_N = fit_scaled_float(scaled_mul(unit, root_of_product(height, variance)));
+  result->variance_per_tangential = fit_scaled_float(scaled_div(variance, tangential_variance));
+  struct scaled peak = variance_of(work, outcome, AMPLITUDE, 0, NULL);
+  result->force_sd_N = fit_scaled_float(scaled_mul(unit, root_of_product(peak, variance)));
   struct scaled moved = scaled_mul(length, amplitude);
-  result->moved_q20_mm[0] = moved_q20(outcome, moved, 0, x_q8);
-  result->moved_q20_mm[1] = moved_q20(outcome, moved, 1, y_q8);
+  result->shift_q20_mm[0] = shift_q20(outcome, moved, 0, x_q8);
+  result->shift_q20_mm[1] = shift_q20(outcome, moved, 1, y_q8);
   result->at_corner = outside >> 1;
-  result->elongated = pad->long_most_q15 == LONG_MOST_NEAR_ENDS_Q15 && fit_tangential_is_elongated(room, outcome, square, round, variance);
+  result->elongated = pad->elongation_max_q15 == NEAR_ENDS_MAX_Q15 && fit_tangential_is_elongated(work, outcome, square, round, variance);
 }
 
 /* What a calibration knows of the pad. */
 static void set_known(const struct fit_array *array, const struct fit_settings *settings, struct problem *problem) {
-  problem->own = settings->own;
+  problem->deviations = settings->deviations;
   problem->sensor = array->grid.sensor;
   problem->model_sd_q16 = MODEL_SD_Q16;
   problem->dip_q22 = 0;
   if (fit_has_dip(settings)) {
     int32_t sd_q20 = fixed_mul_q30(fit_fixed(settings->dip_sd_mm, 20), problem->pad->per_unit_q30);
-    int32_t sd_q13 = fixed_clamp(sd_q20 >> 7, DIP_SD_LEAST_Q13, DIP_SD_MOST_Q13);
+    int32_t sd_q13 = fixed_clamp(sd_q20 >> 7, DIP_SD_MIN_Q13, DIP_SD_MAX_Q13);
     int32_t share_q16 = fit_fixed(settings->dip_share, 16), square_q26 = sd_q13 * sd_q13;
-    problem->model_sd_q16 = fixed_longer_leg(MODEL_SD_Q16, fixed_mul_16(share_q16, FIT_DIP_ERROR_Q16));
-    problem->dip_q22 = fixed_mul_q26(fixed_mul_16(problem->pad->height_q26, share_q16), square_q26) >> 4;
+    problem->model_sd_q16 = fixed_hypot(MODEL_SD_Q16, fixed_mul_16(share_q16, FIT_DIP_ERROR_Q16));
+    problem->dip_q22 = fixed_mul_q26(fixed_mul_16(problem->pad->peak_q26, share_q16), square_q26) >> 4;
     problem->dip_variance_q26 = square_q26 - problem->pad->spread_q26;
   }
 }
@@ -302,10 +303,10 @@ void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad,
   problem.pad = pad;
   set_known(array, settings, &problem);
   struct fit_settings of_readings = *settings;
-  of_readings.dip_share = 0.0f; /* readings without room for a dip */
+  of_readings.dip_share = 0.0f; /* readings without work for a dip */
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
       !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, &of_readings, &problem.readings) ||
-      !weigh(array, settings, fit->used, &problem, &pad->room)) {
+      !weigh(array, settings, fit->used, &problem, &pad->work)) {
     state->steps = 0;
     return;
   }
@@ -314,10 +315,10 @@ void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad,
   set_from_fit(pad, fit, problem.readings.shift, &of_fit);
   begin(pad, state, &of_fit, product(fixed_clamp(fit_fixed(fit->location_noise_mm, 24), 0, 1 << 28), pad->per_unit_q30, 28),
         fit_grid_sum_q20(problem.readings.q28));
-  int32_t long_sd_q26 = fixed_mul_q28(of_fit.amplitude_q24 * 4, pad->long_sd_q26) * 4;
+  int32_t elongation_sd_q26 = fixed_mul_q28(of_fit.amplitude_q24 * 4, pad->elongation_sd_q26) * 4;
   problem.spread_prior_q26 = prior_row(problem.base.base_q22, pad->spread_sd_q26);
-  problem.long_prior_q26 = prior_row(problem.base.base_q22, long_sd_q26);
-  fit_tangential_improve(&problem, &state->at, &pad->room, &outcome);
+  problem.elongation_prior_q26 = prior_row(problem.base.base_q22, elongation_sd_q26);
+  fit_tangential_step(&problem, &state->at, &pad->work, &outcome);
   if (state->steps < STEPS_REPORTED) {
     state->steps++;
   }
@@ -325,7 +326,7 @@ void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad,
     conclude(&problem, &state->at, &outcome, result);
   }
   state->unreported = result->valid ? 0 : state->unreported + 1;
-  if (state->unreported == UNREPORTED_MOST) {
+  if (state->unreported == UNREPORTED_MAX) {
     *state = (struct fit_tangential_state){0};
   }
 }

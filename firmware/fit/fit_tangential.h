@@ -1,12 +1,12 @@
-/* Tangential force from the normal pressures. A pull along the rubber presses the base ahead of it and relieves it
- * behind. This pattern is broader than that of a shifted contact.
+/* Tangential force from the normal pressures. A tangential force presses the base ahead of it and relieves it behind. This pattern is
+ * broader than that of a shifted contact.
  *
  * Eight unknowns: normal force, location, the contact's own spread and its two elongations, and the tangential force
  * along x and y. Each frame takes one Gauss-Newton step: in a contact's first frame from the Gaussian fit, later from
  * where the previous frame ended, moved as the Gaussian has moved and scaled by its force. An estimate after a long
  * step is not reported. After some frames without a report the estimate starts from the Gaussian again.
  *
- * The pad's profile (common/pad_profile.h) describes how its rubber spreads a press and a pull; the dip that a
+ * The pad's profile (common/pad_profile.h) describes how its rubber spreads normal and tangential force; the dip that a
  * calibration has found (fit_settings) is in the model too, as a term that takes. A prior holds elongation near round.
  * Readings count by their noise, gain error and model error. Fixed point, the same bits on every machine, any sensors
  * missing. NUMERICS.md has the derivation, the conditioning and the limits.
@@ -23,9 +23,9 @@
 
 #define FIT_TANGENTIAL_UNKNOWNS 8
 #define FIT_TANGENTIAL_TERMS (PAD_NORMAL_TERMS + PAD_TANGENTIAL_TERMS)
-#define FIT_TANGENTIAL_NODES FIT_GRID_MOST_NODES
+#define FIT_TANGENTIAL_NODES FIT_GRID_MAX_NODES
 
-/* Working memory of one estimate: in no need of being kept between two. */
+/* Working memory of one estimate. It holds nothing from one to the next. */
 union fit_tangential_node {
   struct fit_tangential_terms { /* with the weight, for amplitude 1 */
     int32_t unused[3], normal_q28[PAD_NORMAL_TERMS], tangential_q28[PAD_TANGENTIAL_TERMS];
@@ -37,7 +37,7 @@ union fit_tangential_node {
   } sums;
   int32_t column[FIT_TANGENTIAL_UNKNOWNS]; /* what the Jacobian has there */
 };
-struct fit_tangential_room {
+struct fit_tangential_work {
   int32_t weight_q12[FIT_TANGENTIAL_NODES];
   union fit_tangential_node node[FIT_TANGENTIAL_NODES];
   int32_t residual[FIT_TANGENTIAL_NODES];
@@ -52,14 +52,14 @@ struct fit_pad {
   int32_t variance_q26[FIT_TANGENTIAL_TERMS]; /* of each term without the contact's own */
   int32_t strength_q26[FIT_TANGENTIAL_TERMS]; /* share, or moment */
   int32_t pitch_q26, pitch_square_q26;
-  int32_t spread_q26, spread_sd_q26;     /* prior of the contact's own variance */
-  int32_t height_q26;                    /* of the model's middle with it, for amplitude 1 */
-  int32_t long_sd_q26;                   /* and of its elongations */
-  struct scaled force_unit;              /* N, normal force of amplitude 1 at 1 Pa: all of its bits */
-  struct scaled per_force;               /* amplitude of the Gaussian's 1 N at 1 Pa */
-  int32_t chi_square_max, long_most_q15; /* no report beyond these */
-  struct scaled thin;                    /* by which variances grow on a pad thinner than the pitch */
-  struct fit_tangential_room room;
+  int32_t spread_q26, spread_sd_q26;          /* prior of the contact's own variance */
+  int32_t peak_q26;                           /* of the model's middle with it, for amplitude 1 */
+  int32_t elongation_sd_q26;                  /* and of its elongations */
+  struct scaled force_unit;                   /* N, normal force of amplitude 1 at 1 Pa: all of its bits */
+  struct scaled per_force;                    /* amplitude of the Gaussian's 1 N at 1 Pa */
+  int32_t chi_square_max, elongation_max_q15; /* no report beyond these */
+  struct scaled thin;                         /* by which variances grow on a pad thinner than the pitch */
+  struct fit_tangential_work work;
 };
 
 /* FT_ERR_ARGUMENT: the array is no full rectangle of the grid that this build knows, or the profile
@@ -71,7 +71,7 @@ struct fit_tangential_unknowns {
   int32_t amplitude_q24; /* of the unit of readings */
   int32_t x_q26, y_q26;  /* from the grid's origin node */
   int32_t t_q26, e1_q26, e2_q26;
-  int32_t pull_x_q24, pull_y_q24;
+  int32_t tangential_x_q24, tangential_y_q24;
 };
 
 /* State of one contact, from frame to frame. All zeros: the next frame is its first. Set it to
@@ -92,9 +92,9 @@ struct fit_tangential {
   float force_N, force_sd_N;               /* normal force */
   float qx_N, qy_N;                        /* of the object on the rubber, along x and y */
   float q_sd_N;                            /* standard deviation of either */
-  int32_t moved_q20_mm[2];                 /* how far along x the place would lie elsewhere if qx / force were larger
+  int32_t shift_q20_mm[2];                 /* how far along x the place would lie elsewhere if qx / force were larger
                                               by 1, and along y of qy; what moves across is a tenth of that */
-  float variance_per_pull;                 /* by what more than q_sd_N^2 the misfit has widened location_sd_mm^2 */
+  float variance_per_tangential;           /* by what more than q_sd_N^2 the misfit has widened location_sd_mm^2 */
   bool at_corner; /* within a quarter of a pitch of two outer rows of sensors, or beyond: other shapes fit as well */
   bool elongated; /* the contact is not round, whatever the Gaussian makes of its tangential force */
 };

@@ -1,4 +1,4 @@
-/* Inside fit_tangential alone: what its files share.
+/* Internal to fit_tangential: what its files share.
  *
  * The model of a reading, lengths in units of twice the widest normal term's standard deviation,
  * d = (dx, dy) from the contact to the sensor:
@@ -13,19 +13,19 @@
 #include "fit/fit_grid_parts.h"
 #include "fit/fit_tangential.h"
 
-enum { AMPLITUDE, PLACE_X, PLACE_Y, SPREAD, STRETCH, SLANT, PULL_X, PULL_Y, UNKNOWNS };
+enum { AMPLITUDE, LOCATION_X, LOCATION_Y, SPREAD, ELONGATION_1, ELONGATION_2, TANGENTIAL_X, TANGENTIAL_Y, UNKNOWNS };
 
-#define SPREAD_LEAST_Q15 9830         /* 0.3 of the narrowest normal term's variance: as much below 0 */
-#define SPREAD_MOST_Q26 (ONE_Q26 / 2) /* 2 V0 */
-#define LONG_MAX_Q26 (ONE_Q26 / 4 - 1)
+#define SPREAD_MIN_Q15 9830          /* 0.3 of the narrowest normal term's variance: as much below 0 */
+#define SPREAD_MAX_Q26 (ONE_Q26 / 2) /* 2 V0 */
+#define ELONGATION_MAX_Q26 (ONE_Q26 / 4 - 1)
 #define AMPLITUDE_MAX_Q24 ((4 << 24) - (1 << 11))
-#define PULL_MAX_Q24 (2 << 24)
+#define TANGENTIAL_MAX_Q24 (2 << 24)
 
 /* Where a step begins is rounded, which moves the step and not where it ends: so that what residual and Jacobian have
  * of it is exact in 16 bits, distances from sensors too, whose pitch is such a number. */
-#define PLACE_Q 12
-#define HEIGHT_Q 13 /* of A and B */
-#define LONG_Q 17   /* of e1 and e2 */
+#define LOCATION_Q 12
+#define AMPLITUDE_Q 13  /* of A and B */
+#define ELONGATION_Q 17 /* of e1 and e2 */
 
 /* What of the readings is kept from step to step. */
 struct problem {
@@ -36,15 +36,15 @@ struct problem {
   int32_t model_sd_q16;
   /* The dip, -depth v0 / v exp(-d' d / (2 v)), v = v0 + t as of a term: depth v0, 0: none; v0. */
   int32_t dip_q22, dip_variance_q26;
-  const struct fit_own *own; /* [sensor] or NULL */
-  const uint8_t *sensor;     /* [node] */
+  const struct fit_deviation *deviations; /* [sensor] or NULL */
+  const uint8_t *sensor;                  /* [node] */
   /* Rows of the priors of t and of e1 and e2, whose scale is the amplitude at the beginning. */
-  int32_t spread_prior_q26, long_prior_q26;
+  int32_t spread_prior_q26, elongation_prior_q26;
 };
 
 /* One step's normal equations, solved. L D L^T in place, with a power of two for each pivot between the factors, 2^half
  * about 1 / sqrt(pivot), so that both have all of their 16 bits: below the diagonal L / 2^half, Q14; above it D L
- * 2^half, Q15. A direction whose pivot is below PIVOT_LEAST takes no step. */
+ * 2^half, Q15. A direction whose pivot is below PIVOT_MIN takes no step. */
 struct solution {
   int32_t step_q20[UNKNOWNS]; /* of the normalised columns */
   int32_t half[UNKNOWNS];
@@ -62,7 +62,7 @@ struct outcome {
 };
 
 /* The least t. */
-FIXED_INLINE int32_t spread_least(const struct fit_pad *pad) { return -fixed_mul_16(pad->variance_q26[0], SPREAD_LEAST_Q15) * 2; }
+FIXED_INLINE int32_t spread_min(const struct fit_pad *pad) { return -fixed_mul_16(pad->variance_q26[0], SPREAD_MIN_Q15) * 2; }
 
 /* Three quarters of a pitch beyond the outer nodes, for an even number of them beyond those on the origin's far side too. */
 FIXED_INLINE int32_t reach(const struct fit_pad *pad, int32_t nodes) { return (4 * (nodes / 2) + 3) * (pad->pitch_q26 >> 2); }
@@ -90,16 +90,16 @@ FIXED_INLINE int32_t rounded(int32_t value, int shift) { return (value + (1 << (
 
 /* fit_tangential_model.c: residuals and columns of the model there, with the weights. column_q: Qs in which it leaves the columns. */
 extern const uint8_t fit_tangential_column_q[UNKNOWNS];
-void fit_tangential_linearise(const struct problem *problem, const struct fit_tangential_unknowns *at, struct fit_tangential_room *room);
+void fit_tangential_linearise(const struct problem *problem, const struct fit_tangential_unknowns *at, struct fit_tangential_work *work);
 
 /* fit_tangential_step.c: one Gauss-Newton step from there. */
-void fit_tangential_improve(const struct problem *problem, struct fit_tangential_unknowns *at, struct fit_tangential_room *room,
-                            struct outcome *outcome);
+void fit_tangential_step(const struct problem *problem, struct fit_tangential_unknowns *at, struct fit_tangential_work *work,
+                         struct outcome *outcome);
 
 /* Variance of an unknown, in its unit squared, of readings whose variance is 1: an element of the
- * diagonal of the inverse matrix. with_pull_q8: the element of the row for this pull, or NULL. */
-FIXED_INLINE struct scaled variance_of(const struct fit_tangential_room *room, const struct outcome *outcome, int u, int pull,
-                                       int32_t *with_pull_q8) {
+ * diagonal of the inverse matrix. influence_q8: the element of the row for this pull, or NULL. */
+FIXED_INLINE struct scaled variance_of(const struct fit_tangential_work *work, const struct outcome *outcome, int u, int pull,
+                                       int32_t *influence_q8) {
   const struct solution *solution = &outcome->solution;
   int32_t w_q8[UNKNOWNS]; /* row of the inverse of L, times 2^half */
   int32_t sum_q11 = 0;
@@ -107,19 +107,19 @@ FIXED_INLINE struct scaled variance_of(const struct fit_tangential_room *room, c
     int32_t w = k == u ? 1 << 8 : 0;
     for (int m = u; m < k; m++) {
       // cppcheck-suppress uninitvar ; m < k, and the rounds before have set those
-      w -= (room->matrix[k][m] * w_q8[m]) >> 14;
+      w -= (work->matrix[k][m] * w_q8[m]) >> 14;
     }
     w_q8[k] = w = fixed_clamp(shifted(w, solution->half[k]), -INT16_MAX, INT16_MAX);
     sum_q11 += (((w * w) >> 9) * (solution->inverse_q13[k] >> 6)) >> 3;
   }
-  if (with_pull_q8) {
-    *with_pull_q8 = w_q8[pull];
+  if (influence_q8) {
+    *influence_q8 = w_q8[pull];
   }
   return fit_scaled_from(sum_q11, 2 * outcome->column_q[u] - 30 - 11);
 }
 
 FIXED_INLINE bool exceeds(struct scaled a, struct scaled b) { return scaled_sub(a, b).mantissa > 0; }
 
-/* fit_tangential_long.c. square: e1^2 + e2^2; round: A v. variance: of a reading of weight 1. */
-bool fit_tangential_is_elongated(const struct fit_tangential_room *room, const struct outcome *outcome, struct scaled square,
+/* fit_tangential_elongation.c. square: e1^2 + e2^2; round: A v. variance: of a reading of weight 1. */
+bool fit_tangential_is_elongated(const struct fit_tangential_work *work, const struct outcome *outcome, struct scaled square,
                                  struct scaled round, struct scaled variance);

@@ -11,19 +11,19 @@
 #define FIT_SIGMA_MAX 5.0f
 
 /* Nodes of a rectangle along one axis, at most. */
-#define FIT_GRID_MAX_NODES 6
+#define FIT_GRID_MAX_SIDE 6
 
 /* The fixed-point kernels take the rectangle of FIT_GRID_COLUMNS x FIT_GRID_ROWS sensors that they are compiled for;
  * with FIT_GRID_ANY instead, as for the host, each call takes that of its array, and gives the same bits more slowly. */
 #ifdef FIT_GRID_ANY
-#define FIT_GRID_MOST_NODES FT_MAX_SENSORS
+#define FIT_GRID_MAX_NODES FT_MAX_SENSORS
 #else
-#define FIT_GRID_MOST_NODES (FIT_GRID_COLUMNS * FIT_GRID_ROWS)
+#define FIT_GRID_MAX_NODES (FIT_GRID_COLUMNS * FIT_GRID_ROWS)
 #endif
 
 /* A full rectangle of sensors, for the fixed-point kernels. */
 struct fit_grid_shape {
-  uint8_t columns, rows;               /* nodes along x and y, 2..FIT_GRID_MAX_NODES; 0: no grid */
+  uint8_t columns, rows;               /* nodes along x and y, 2..FIT_GRID_MAX_SIDE; 0: no grid */
   uint8_t sensor[FT_MAX_SENSORS];      /* [column * rows + row] */
   int32_t x_min, x_max;                /* box of the location, Q26 pitches from node (columns / 2, */
   int32_t y_min, y_max;                /* rows / 2) */
@@ -33,7 +33,7 @@ struct fit_grid_shape {
   int32_t settled_square;              /* half the square of the settled step, Q22 pitches */
 };
 
-/* The array as the fit sees it. Fill with fit_array_init; read-only afterwards. */
+/* The array. fit_array_init fills it; it is read-only afterwards. */
 struct fit_array {
   uint8_t sensor_count;
   float pitch_mm;
@@ -44,8 +44,8 @@ struct fit_array {
   struct fit_grid_shape grid;
 };
 
-/* Of a sensor, beside its gain: how far it is from its place in the array, and how much wider than the others it responds to a contact. */
-struct fit_own {
+/* How a sensor differs from the others, besides its gain: its offset from its place in the array, and the width of its response. */
+struct fit_deviation {
   int32_t off_x_q15, off_y_q15; /* pitches; within +-1, as the next */
   int32_t wider_q15;            /* log of its width over theirs */
 };
@@ -63,9 +63,9 @@ struct fit_settings {
   /* What the rubber takes from the readings around a contact, where that is known: dip_share p0 exp(-r^2 / (2 dip_sd^2)). Readings are not
    * cut then. None unless the share is above 0 and at most FIT_DIP_SHARE_MAX, and the sd is 0.001..10000 mm. */
   float dip_share, dip_sd_mm;
-  /* [sensor] or NULL: not known. Before the last two of three and more iterations, each reading is
-   * corrected by it to first order, by at most half of what the model has there. */
-  const struct fit_own *own;
+  /* [sensor] or NULL: not known. The fit corrects each reading by it to first order, by at most half of the model there, before the last
+   * two of three and more iterations. */
+  const struct fit_deviation *deviations;
   /* Other errors that the standard deviations contain. */
   uint16_t gain_sd_q16[FT_MAX_SENSORS];   /* [sensor] relative sd of its gain; 0: exact */
   int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* [sensor] sd of what rubber keeps, before gains, 1/1024 Pa; 0..2^29 */
@@ -85,7 +85,7 @@ struct fit_result {
   float force_N;           /* 2 pi p0 sigma^2 */
   float residual_rms_Pa;   /* over the sensors used */
   float location_sd_mm;    /* radial: 63 % of errors are smaller, 98 % smaller than twice it; without
-                              what a tangential force does, which fit_doubt.h adds */
+                              what a tangential force does, which fit_bias.h adds */
   float location_noise_mm; /* what of it is noise: how far a contact at rest jitters */
   float force_sd_N;
   float sigma_x_mm, sigma_y_mm; /* WIDTHS_VALID: of an elliptic Gaussian, along the axes */
@@ -95,16 +95,15 @@ struct fit_result {
                                    UNCERTAIN, MODEL, AT_BOUND, SENSOR_MASKED, WIDTHS_VALID, ELONGATED */
 };
 
-/* What frames that follow each other keep of the search for an outlier, for FIT_WATCH_FRAMES frames of the same
- * sensors: an outlier is left out at once, and where there was none, none is searched for. Before, only residuals that
- * have grown by half of what they were, relative to the force, begin another search, and not in the first
- * FIT_WATCH_LEAST frames (NUMERICS.md, "Outliers"). All zeros: nothing found yet. */
-#define FIT_WATCH_FRAMES 128
-#define FIT_WATCH_LEAST 8
-struct fit_watch {
+/* Result of the search for an outlier, valid for FIT_OUTLIER_FRAMES frames of the same sensors. An outlier is left out at once; where there
+ * was none, the fit does not search. After FIT_OUTLIER_RETRY_FRAMES, residuals that have grown by half, relative to the force, begin
+ * another search (NUMERICS.md, "Outliers"). All zeros: no search yet. */
+#define FIT_OUTLIER_FRAMES 128
+#define FIT_OUTLIER_RETRY_FRAMES 8
+struct fit_outlier_state {
   sensor_map usable;   /* of these sensors */
   sensor_map left_out; /* bitmap of at most one */
-  uint16_t frames;     /* that it is still kept for */
+  uint16_t frames;     /* for which it is still valid */
   float residual_rms_Pa, force_N;
-  struct fit_result without; /* room of a search */
+  struct fit_result refit; /* working memory of a search */
 };

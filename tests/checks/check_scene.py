@@ -22,9 +22,9 @@ OWNED = {
     ),
     "SLIP": (["ft_contact.dir/contact/slip.c.obj"], r"contact_update|cmd_slip_\w+"),
     "FULL_GRID": (["ft_fit.dir/fit/fit_grid.c.obj"], r"fit_grid"),
-    "OUTLIERS": ([], r"fit_grid_outlier|leave_outlier_out|fit_gaussian_grid_follow"),
-    "TANGENTIAL_DOUBT": (
-        ["ft_fit.dir/fit/fit_doubt.c.obj", "ft_fit.dir/fit/fit_gains.c.obj", "ft_app.dir/app/doubt_stage.c.obj"],
+    "OUTLIERS": ([], r"fit_grid_outlier|leave_outlier_out|fit_gaussian_grid_update"),
+    "TANGENTIAL_BIAS": (
+        ["ft_fit.dir/fit/fit_bias.c.obj", "ft_fit.dir/fit/fit_gains.c.obj", "ft_app.dir/app/uncertainty_stage.c.obj"],
         r"fit_(doubt|gains)_\w+",
     ),
     "SHAPES": (

@@ -55,7 +55,7 @@ class Checks(unittest.TestCase):
 
     def test_what_a_scene_switches_off(self):
         scene = ("check_scene.py", "--build", BUILD, "--capabilities")
-        everything = ["FIT", "FULL_GRID", "OUTLIERS", "TANGENTIAL_DOUBT", "SLIP", "TANGENTIAL", "RAW_STREAM", "SYNC"]
+        everything = ["FIT", "FULL_GRID", "OUTLIERS", "TANGENTIAL_BIAS", "SLIP", "TANGENTIAL", "RAW_STREAM", "SYNC"]
         self.assertEqual(self.run_check(*scene, *everything).returncode, 0)
         for off, symbol in (("SLIP", "cmd_slip_"), ("FIT", ""), ("SYNC", ""), ("TANGENTIAL", "")):
             self.assert_fails(f"{off} is off, but the image has {symbol}", *scene, *(name for name in everything if name != off))

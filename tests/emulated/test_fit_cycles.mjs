@@ -21,7 +21,7 @@ const SEARCH_CYCLES_MAX = 46600;
 const OUTLIER_CYCLES_MAX = 96500;
 /** A frame's tangential estimate, which follows the fit, with the image's pad. */
 const TANGENTIAL_CYCLES_MAX = 43000;
-/** A part of the look for a load that is not estimated, which follows the frame's packet (fit_doubt.h), and all of them. */
+/** A part of the look for a load that is not estimated, which follows the frame's packet (fit_bias.h), and all of them. */
 const LOAD_PART_CYCLES_MAX = 6700;
 const LOAD_CYCLES_MAX = 25000;
 const LOAD_PARTS = 6;

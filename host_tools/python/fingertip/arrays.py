@@ -128,7 +128,7 @@ def usable_of(readings):
 class Firmware(Library):
     def __init__(self, path):
         super().__init__(path)
-        self.no_own = np.zeros((0, 0), self.records.get("fit_own", "V12"))
+        self.no_own = np.zeros((0, 0), self.records.get("fit_deviation", "V12"))
 
     @property
     def constants(self):
@@ -215,14 +215,14 @@ class Firmware(Library):
         return found
 
     def calibrate(self, x_mm, y_mm, pitch_mm, t_s, reading_Pa, noise_Pa, *, force_N=1.0, fading=None, last=True):
-        """(calibration [session], calibrated_sensor [session, sensor], fit_own [session, sensor]) of sessions of placements: t_s [session, placement],
+        """(calibration [session], calibrated_sensor [session, sensor], fit_deviation [session, sensor]) of sessions of placements: t_s [session, placement],
         reading_Pa [session, placement, sensor], NaN where a sensor has none. force_N: of each; fading: share of the readings
         that each loses in half a second; last: no placement follows."""
         sessions, _, sensors = reading_Pa.shape
         found = (
             self.made("calibration", sessions),
             self.made("calibrated_sensor", sessions, sensors),
-            self.made("fit_own", sessions, sensors),
+            self.made("fit_deviation", sessions, sensors),
         )
         self.call(
             "calibrate",

@@ -219,7 +219,7 @@ def inputs(
     has_profile: bool = False,
     **fields: Any,
 ) -> tuple[Any, Any, npt.NDArray[np.int32], npt.NDArray[np.uint64], Any]:
-    """What the fit gets of readings: fit_array, fit_settings, readings in 1/1024 Pa, bitmap of the usable sensors, fit_own or None. fields: of
+    """What the fit gets of readings: fit_array, fit_settings, readings in 1/1024 Pa, bitmap of the usable sensors, fit_deviation or None. fields: of
     fit_settings."""
     known = calibration or {}
     prior = {} if has_profile else {"prior_sigma_mm": known.get("sigma_mm", 0.0), "prior_width_mm": known.get("sigma_sd_mm", 0.0)}
@@ -228,7 +228,7 @@ def inputs(
     settings = chip.settings(noise_Pa=noise_Pa, gain_sd=known.get("gain_sd") or None, **(prior | dip | cut | fields))
     own = None
     if known.get("off_x_mm"):
-        own = chip.made("fit_own", 1, len(pad.x_mm))
+        own = chip.made("fit_deviation", 1, len(pad.x_mm))
         for key, unit in (("off_x_mm", pad.pitch_mm), ("off_y_mm", pad.pitch_mm), ("wider", 1.0)):
             own[f"{key.removesuffix('_mm')}_q15"] = round_half_away(
                 np.clip(32768.0 * np.asarray(known.get(key, 0.0)) / unit, -32767, 32767)
@@ -334,7 +334,7 @@ def _add_shapes(
     array, settings, held, usable, own = of
     rows = len(held)
     published, pad = chip.made("published", rows), chip.made("fit_shapes_pad", 1)
-    shapes, places = chip.made("fit_shapes_result", rows, 2), chip.made("shapes_place", rows, 2)
+    shapes, places = chip.made("fit_shapes_result", rows, 2), chip.made("shapes_location", rows, 2)
     estimated = [np.ascontiguousarray(each[:, -1]) for each in chip.tangential(array, profile, settings, held, usable, own=own)]
     chip.call("publish", profile, np.full(rows, scales[0] if is_scaled else 0.0), scales[1], *estimated, published)
     with contextlib.suppress(MeasureError):  # rubber too thin for the pitch has no shapes

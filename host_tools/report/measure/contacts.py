@@ -47,7 +47,7 @@ class Contacts(Measure):
                 # What the calibration found.
                 ("dip_share", float),
                 ("dip_sd_mm", float),
-                ("own", self.records["fit_own"], SENSORS),
+                ("own", self.records["fit_deviation"], SENSORS),
                 # How the pad is cast.
                 ("cast_dip_share", float),
                 ("seat", self.records["twin_seat"], SENSORS),
@@ -169,11 +169,11 @@ class Contacts(Measure):
         return published, found
 
     def held_shapes(self, readings_Pa, pads, noise_Pa, published, profile, past_sd_Pa=0.0):
-        """(fit_shapes_result, shapes_place), each [touch, first or last], of contacts [touch, frame, sensor]."""
+        """(fit_shapes_result, shapes_location), each [touch, first or last], of contacts [touch, frame, sensor]."""
         pad = self.made("fit_shapes_pad", 1)
         self.call("shapes_pad", self.own_array, profile, pad)
         own = self.own_of(pads)
-        found = self.made("fit_shapes_result", len(readings_Pa), 2), self.made("shapes_place", len(readings_Pa), 2)
+        found = self.made("fit_shapes_result", len(readings_Pa), 2), self.made("shapes_location", len(readings_Pa), 2)
         settings = self.settings_of(pads, noise_Pa)
         settings["past_sd_Pa_q10"][:, :SENSORS] = q10(past_sd_Pa)
         readings = q10(readings_Pa), self.usable(readings_Pa), published

@@ -101,7 +101,7 @@ MEASURE_ENTRY(pad_placements)
 // Sessions of at most `planned` placements as the tool leads them.
 static void pad_lead(std::string session_kind, Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache,
                      Batch<const std::int64_t, 1> seeds, std::int64_t planned, Batch<calibration, 1> found,
-                     Batch<calibrated_sensor, 2> sensors, Batch<fit_own, 2> own, Batch<std::int64_t, 1> placements) {
+                     Batch<calibrated_sensor, 2> sensors, Batch<fit_deviation, 2> own, Batch<std::int64_t, 1> placements) {
   same_length(seeds, found, sensors, own, placements);
   const Pads pads{kinds, layer_mm, cache, seeds};
   const Feet &feet = pads.feet();
@@ -153,7 +153,7 @@ MEASURE_ENTRY(pad_gains)
 // What accepted calibrations found: sessions of thirty placements on pads of their own, each repeated on another pad
 // until a calibration is accepted. true_gain, true_dip_share and seats are how that pad is.
 static void pad_calibrated(Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache, Batch<const std::int64_t, 1> seeds,
-                           Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors, Batch<fit_own, 2> own,
+                           Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors, Batch<fit_deviation, 2> own,
                            Batch<double, 2> true_gain, Batch<double, 1> true_dip_share, Batch<twin::Pad::Seat, 2> seats) {
   same_length(seeds, found, sensors, own, true_gain, true_dip_share, seats);
   const Pads pads{kinds, layer_mm, cache, seeds};

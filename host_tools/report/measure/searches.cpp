@@ -26,7 +26,7 @@ static void gains_learn(Batch<const fit_array, 1> array, Batch<const fit_setting
   same_length(gains, settings, pressure_Pa_q10, fits, gain_sd);
   for (std::size_t i = 0; i < gains.size(); i++) {
     if (is_first_of_touch) {
-      fit_gains_lift(&gains[i]);
+      fit_gains_end_touch(&gains[i]);
     }
     if (fit_gains_learn(&gains[i], array.data, pressure_Pa_q10.row(i), &settings[i], &fits[i])) {
       gain_sd[i] = static_cast<double>(fit_gains_sd(&gains[i]));

@@ -45,7 +45,7 @@ def kinds(firmware, *each):
 
 @dataclasses.dataclass
 class Session:
-    """What calibrations found: calibration [pad], calibrated_sensor and fit_own [pad, sensor]."""
+    """What calibrations found: calibration [pad], calibrated_sensor and fit_deviation [pad, sensor]."""
 
     found: np.ndarray
     sensors: np.ndarray
@@ -56,7 +56,7 @@ class Session:
         return cls(
             firmware.made("calibration", count),
             firmware.made("calibrated_sensor", count, SENSORS),
-            firmware.made("fit_own", count, SENSORS),
+            firmware.made("fit_deviation", count, SENSORS),
         )
 
     def where(self, chosen):

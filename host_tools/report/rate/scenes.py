@@ -17,7 +17,7 @@ WORDS = {
     "FIT": "location, force",
     "FULL_GRID": "widths, elongated contacts",
     "OUTLIERS": "search for a broken sensor",
-    "TANGENTIAL_DOUBT": "warning of a tangential force that is not estimated, learning of gains",
+    "TANGENTIAL_BIAS": "warning of a tangential force that is not estimated, learning of gains",
     "SLIP": "slip",
     "TANGENTIAL": "tangential force, velocity",
     "SHAPES": "contact shapes",

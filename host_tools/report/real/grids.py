@@ -133,7 +133,7 @@ class Fingertip:
 
 @dataclasses.dataclass
 class Calibration:
-    """One session: calibration, calibrated_sensor and fit_own [sensor]."""
+    """One session: calibration, calibrated_sensor and fit_deviation [sensor]."""
 
     found: np.void
     sensors: np.ndarray

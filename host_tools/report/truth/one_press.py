@@ -1,7 +1,7 @@
 """How well the fit's numbers state how far they are from the truth.
 
 Touches of the twin's objects on pads go through the firmware's fit with the settings that the firmware starts with. Those under a tangential force
-also go through its search for a tangential force that is not estimated (fit_doubt.h). The constants of fit_limits.h and defaults.h were chosen with
+also go through its search for a tangential force that is not estimated (fit_bias.h). The constants of fit_limits.h and defaults.h were chosen with
 --seed 1.
 """
 
@@ -24,7 +24,7 @@ BAD_mm = 1.0
 # Rounded feet, a flat cylinder and a cube, and everyday objects; all of them round or nearly so.
 OBJECTS = ("sphere6", "sphere15", "cylinder6", "cube6", "ping_pong", "rubber_duck", "lime")
 FORCE_N = (1.0, 15.0)
-SEARCH_FRAMES = 6  # FIT_DOUBT_PARTS of fit_doubt.h
+SEARCH_FRAMES = 6  # FIT_BIAS_PARTS of fit_bias.h
 WARNINGS = Flag.UNCERTAIN | Flag.MODEL | Flag.FLAT | Flag.AT_BOUND | Flag.LOW_SIGNAL
 OSRS = tuple(CONVERSION_us)
 

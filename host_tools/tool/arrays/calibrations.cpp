@@ -19,7 +19,7 @@ MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(text), FIELD(solv
 MEASURE_RECORD(calibrated_sensor, FIELD(gain), FIELD(gain_sd), FIELD(reading_sd), FIELD(off_x_mm), FIELD(off_y_mm), FIELD(wider))
 
 void fingertip::measure::describe(const Array &layout, const std::vector<Placement> &placements, const Judgement &judgement, double force_N,
-                                  calibration &found, calibrated_sensor *sensors, fit_own *own) {
+                                  calibration &found, calibrated_sensor *sensors, fit_deviation *own) {
   const Solution &solution = judgement.solution, &stored = judgement.kept;
   const Shape shape = shape_of(stored);
   found = {};
@@ -49,9 +49,9 @@ void fingertip::measure::describe(const Array &layout, const std::vector<Placeme
     found.force_scale = scale->scale;
     found.force_scale_sd = scale->sd;
   }
-  const std::vector<fit_own> kept = own_of(layout, shape);
+  const std::vector<fit_deviation> kept = own_of(layout, shape);
   found.has_own = !kept.empty();
-  std::fill_n(own, layout.sensors(), fit_own{});
+  std::fill_n(own, layout.sensors(), fit_deviation{});
   std::copy(kept.begin(), kept.end(), own);
   for (std::size_t k = 0; k < layout.sensors(); k++) {
     const auto at = [&](const std::vector<double> &values) { return k < values.size() ? values[k] : 0.0; };
@@ -65,7 +65,7 @@ void fingertip::measure::describe(const Array &layout, const std::vector<Placeme
 // [session][sensor]: zeros unless the session found it.
 static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm, double noise_Pa, double force_N,
                       std::int64_t last, Batch<const double, 2> t_s, Batch<const double, 3> reading_Pa, Batch<const double, 2> fading,
-                      Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors, Batch<fit_own, 2> own) {
+                      Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors, Batch<fit_deviation, 2> own) {
   same_length(x_mm, y_mm);
   same_length(found, t_s, reading_Pa, sensors, own);
   require(fading.size() == 0 || (fading.size() == found.size() && fading.size(1) == t_s.size(1)), "other fadings");

@@ -33,6 +33,6 @@ struct calibrated_sensor {
 
 // sensors, own: [sensor]; own is zeros unless has_own. force_N: of each placement.
 void describe(const calibrating::Array &layout, const std::vector<calibrating::Placement> &placements,
-              const calibrating::Judgement &judgement, double force_N, calibration &found, calibrated_sensor *sensors, fit_own *own);
+              const calibrating::Judgement &judgement, double force_N, calibration &found, calibrated_sensor *sensors, fit_deviation *own);
 
 } // namespace fingertip::measure

@@ -6,7 +6,7 @@ extern "C" {
 #include "config/defaults.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
-#include "fit/fit_doubt.h"
+#include "fit/fit_bias.h"
 }
 
 #include <ctime>
@@ -16,7 +16,7 @@ using namespace fingertip::measure;
 using fingertip::twin::in_parallel;
 
 MEASURE_RECORD(fit_array, FIELD(sensor_count), FIELD(pitch_mm), FIELD(x), FIELD(y))
-MEASURE_RECORD(fit_own, FIELD(off_x_q15), FIELD(off_y_q15), FIELD(wider_q15))
+MEASURE_RECORD(fit_deviation, FIELD(off_x_q15), FIELD(off_y_q15), FIELD(wider_q15))
 MEASURE_RECORD(fit_settings, FIELD(iterations), FIELD(noise_Pa_q10), FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(cut_noises),
                FIELD(dip_share), FIELD(dip_sd_mm), FIELD(gain_sd_q16), FIELD(past_sd_Pa_q10), FIELD(model_sd_q16),
                FIELD(location_sd_limit_mm))
@@ -68,7 +68,7 @@ static Kernel kernel_named(const std::string &name) {
 // kernel: "grid", "masked", "general", "fit" (fit_gaussian) or "fit_grid" (fit_gaussian_grid). us: of one fit, if a
 // single thread runs them.
 static void fit(std::string kernel, std::int64_t threads, Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
-                Batch<const fit_own, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const sensor_map, 1> usable,
+                Batch<const fit_deviation, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const sensor_map, 1> usable,
                 Batch<fit_result, 1> results, Batch<double, 1> us) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(1), own);
   same_length(results, pressure_Pa_q10, usable);
@@ -88,7 +88,7 @@ MEASURE_ENTRY(fit)
 
 // Fit of held presses [press][frame][sensor]: that of the last frame, with what the search for a tangential force that
 // is not estimated has found in the frames before. A single frame is not searched.
-static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
+static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_deviation, 2> own,
                      Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable, Batch<fit_result, 1> results) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   same_length(results, pressure_Pa_q10, usable);
@@ -99,13 +99,13 @@ static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings,
     const fit_settings settings = settings_of(all_settings, own, press);
     const std::int32_t *pressure = pressure_Pa_q10.row(press);
     fit_gaussian(array, pressure, usable.row(press)[0], &settings, &results[press]);
-    fit_doubt doubt{};
+    fit_bias bias{};
     for (std::size_t i = 1; i < frames; i++, pressure += sensors) {
-      fit_doubt_follow(&doubt, array, pressure, &settings, &results[press]);
+      fit_bias_step(&bias, array, pressure, &settings, &results[press]);
       fit_gaussian(array, pressure + sensors, usable.row(press)[i], &settings, &results[press]);
     }
     if (frames > 1) {
-      fit_doubt_widen(&doubt, array, &settings, &results[press]);
+      fit_bias_widen(&bias, array, &settings, &results[press]);
     }
   });
 }

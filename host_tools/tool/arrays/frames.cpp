@@ -63,7 +63,7 @@ MEASURE_ENTRY(default_contact_settings)
 
 // frames [run][frame] through condition, fit and contact, as the firmware's main loop does it. Every run begins after
 // the frames `before`; the noise is that of each frame. gains: one, or none for sensors that are alike.
-static void chain(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_own, 2> own,
+static void chain(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_deviation, 2> own,
                   Batch<const contact_settings, 1> contacts, Batch<const condition_gains, 1> gains, Batch<const frame, 1> before,
                   Batch<const frame, 2> frames, Batch<conditioned, 2> readings, Batch<fit_result, 2> fits,
                   Batch<contact_result, 2> results) {
@@ -113,7 +113,8 @@ MEASURE_RECORD(pad_profile, FIELD(thickness_mm), FIELD(overhang_mm), FIELD(norma
                FIELD(spread_sd_mm2), FIELD(force_ratio), FIELD(tangential_scale), FIELD(tangential_scale_sd), FIELD(from_touch))
 MEASURE_RECORD(fit_pad)
 MEASURE_RECORD(fit_tangential, FIELD(valid), FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm), FIELD(location_noise_mm), FIELD(force_N),
-               FIELD(force_sd_N), FIELD(qx_N), FIELD(qy_N), FIELD(q_sd_N), FIELD(moved_q20_mm), FIELD(variance_per_pull), FIELD(elongated))
+               FIELD(force_sd_N), FIELD(qx_N), FIELD(qy_N), FIELD(q_sd_N), FIELD(shift_q20_mm), FIELD(variance_per_tangential),
+               FIELD(elongated))
 MEASURE_RECORD(fit_shapes_pad)
 MEASURE_RECORD(fit_shapes_result, FIELD(shape), FIELD(x_mm), FIELD(y_mm), FIELD(force_N), FIELD(location_sd_mm), FIELD(force_sd_N),
                FIELD(length_mm), FIELD(along_x), FIELD(along_y), FIELD(angle_sd_rad), FIELD(qx_N), FIELD(qy_N), FIELD(chi_square))
@@ -138,7 +139,7 @@ MEASURE_ENTRY(shapes_pad)
 // Fit and tangential estimate of contacts [contact][frame][sensor], each from its first frame on; saturated: bitmap of the sensors that are
 // left out, usable of those that are not missing. Frames whose fit is not worthwhile have no estimate, and the one after begins again.
 static void tangential(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1> pads, Batch<const fit_settings, 1> all_settings,
-                       Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable,
+                       Batch<const fit_deviation, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable,
                        Batch<const sensor_map, 2> saturated, Batch<fit_result, 2> fits, Batch<fit_tangential, 2> results) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   same_length(results, fits, pressure_Pa_q10, usable, saturated);

@@ -7,7 +7,7 @@ extern "C" {
 #include "config/defaults.h"
 #include "contact/motion.h"
 #include "contact/shapes.h"
-#include "fit/fit_doubt.h"
+#include "fit/fit_bias.h"
 }
 
 #include <algorithm>
@@ -90,13 +90,13 @@ static void weigh(double force_scale, double force_scale_sd, Batch<const fit_res
 }
 MEASURE_ENTRY(weigh)
 
-MEASURE_RECORD(shapes_place, FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm))
+MEASURE_RECORD(shapes_location, FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm))
 
 // The shapes, as scene grasp has them, of contacts [contact][frame][sensor] that are held: after FIT_SHAPES_FRAMES
 // frames the first answer, and the last. Where the tangential force is estimated, its location is used.
 static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes_pad, 1> pad, Batch<const fit_settings, 1> all_settings,
-                        Batch<const fit_own, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable,
-                        Batch<const published, 1> estimates, Batch<fit_shapes_result, 2> results, Batch<shapes_place, 2> places) {
+                        Batch<const fit_deviation, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable,
+                        Batch<const published, 1> estimates, Batch<fit_shapes_result, 2> results, Batch<shapes_location, 2> places) {
   const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
   const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
   same_length(results, places, pressure_Pa_q10, usable, estimates);
@@ -114,16 +114,16 @@ static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes
     load.x_mm = static_cast<float>(estimate.x_mm);
     load.y_mm = static_cast<float>(estimate.y_mm);
     load.location_sd_mm = static_cast<float>(estimate.location_sd_mm);
-    fit_doubt doubt{};
+    fit_bias bias{};
     for (std::size_t i = 0; i < frames; i++) {
       std::copy_n(pressure_Pa_q10.row(contact) + i * sensors, sensors, question.pressure_Pa_q10);
       question.begins = i == 0;
       fit_gaussian_grid(array, question.pressure_Pa_q10, usable.row(contact)[i], &question.settings, &question.fit);
       shapes_estimate(job.get());
-      fit_doubt_follow(&doubt, array, question.pressure_Pa_q10, &question.settings, &question.fit);
+      fit_bias_step(&bias, array, question.pressure_Pa_q10, &question.settings, &question.fit);
       const bool last = i == frames - 1;
       if (last || i == FIT_SHAPES_FRAMES - 1) {
-        fit_doubt_widen(&doubt, array, &question.settings, &question.fit);
+        fit_bias_widen(&bias, array, &question.settings, &question.fit);
         fit_shapes_result &result = results.row(contact)[last ? 1 : 0];
         result = job->result;
         result.shape = job->report.shape; // which stays, while what is none of these begins again

@@ -80,7 +80,7 @@ static void solve_placements(Batch<const double, 1> x_mm, Batch<const double, 1>
     all[i].rest_Pa.assign(reading_Pa + sensors, reading_Pa + 2 * sensors);
   }
   const Judgement judgement = judge(array, all, true);
-  describe(array, all, judgement, force_N, kept[0], kept_sensors.data, std::vector<fit_own>(sensors).data());
+  describe(array, all, judgement, force_N, kept[0], kept_sensors.data, std::vector<fit_deviation>(sensors).data());
   const Solution &solution = judgement.solution;
   solved_placements &found = solved[0];
   if (!solution.solved) {

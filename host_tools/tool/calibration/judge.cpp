@@ -324,7 +324,7 @@ struct FirmwareFit {
     settings.prior_width_mm = static_cast<float>(shape.sigma_sd_mm);
     settings.dip_share = static_cast<float>(shape.dip_share);
     settings.dip_sd_mm = static_cast<float>(shape.dip_sd_mm);
-    settings.own = own.empty() ? nullptr : own.data();
+    settings.deviations = own.empty() ? nullptr : own.data();
   }
   std::optional<fit_result> operator()(const Placement &placement, const std::vector<double> &gain) {
     std::int32_t pressure[FT_MAX_SENSORS] = {};
@@ -343,7 +343,7 @@ struct FirmwareFit {
   /* The firmware's own settings (config/defaults.h), without a pad profile; a mean of many frames has hardly any noise. */
   static constexpr std::uint8_t ITERATIONS = 4, CUT_NOISES = 4;
   static constexpr std::int32_t NOISE_Pa_Q10 = 1024;
-  std::vector<fit_own> own;
+  std::vector<fit_deviation> own;
   fit_array of{};
   fit_settings settings{};
   bool usable_array = false;
@@ -357,7 +357,7 @@ bool goes_astray(const Array &array, const Solution &s) {
   const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
   const auto [bottom, top] = std::minmax_element(array.y_mm.begin(), array.y_mm.end());
   const std::vector<double> ones(array.sensors(), 1.0);
-  const bool ends = fit_steps_want_dip(&fit.of, &fit.settings);
+  const bool ends = fit_jacobian_needs_dip(&fit.of, &fit.settings);
   for (double x = *left; x <= *right; x += array.pitch_mm / STEPS) {
     for (double y = *bottom; y <= *top; y += array.pitch_mm / STEPS) {
       Placement press;
@@ -365,7 +365,7 @@ bool goes_astray(const Array &array, const Solution &s) {
       for (std::size_t k = 0; k < array.sensors(); k++) {
         const double per = std::pow(std::hypot(array.x_mm[k] - x, array.y_mm[k] - y) / s.width_mm, 2) / 2.0;
         const double there =
-            ends ? fit_dip_there(&fit.of, float(x / array.pitch_mm), float(y / array.pitch_mm), fit.of.x[k], fit.of.y[k]) : 1.0F;
+            ends ? fit_dip_share(&fit.of, float(x / array.pitch_mm), float(y / array.pitch_mm), fit.of.x[k], fit.of.y[k]) : 1.0F;
         press.reading_Pa.push_back(s.peak_Pa * ((1.0 - s.mixing) * std::exp(-per) + s.mixing * std::exp(-per / (NARROW * NARROW)) -
                                                 there * s.dip * std::exp(-per / (s.dip_widths * s.dip_widths))));
       }
@@ -479,9 +479,9 @@ Shape without_width(Shape shape) {
   return shape;
 }
 
-std::vector<fit_own> own_of(const Array &array, const Shape &shape) {
+std::vector<fit_deviation> own_of(const Array &array, const Shape &shape) {
   const auto q15 = [](double value) { return static_cast<std::int32_t>(std::lround(std::clamp(32768.0 * value, -32767.0, 32767.0))); };
-  std::vector<fit_own> made;
+  std::vector<fit_deviation> made;
   for (const Own &own : shape.own) {
     made.push_back({q15(own.off_x_mm / array.pitch_mm), q15(own.off_y_mm / array.pitch_mm), q15(own.wider)});
   }

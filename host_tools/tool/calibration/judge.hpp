@@ -17,7 +17,7 @@
 #include <optional>
 #include <string>
 
-struct fit_own;
+struct fit_deviation;
 
 namespace fingertip::calibrating {
 
@@ -106,7 +106,7 @@ Shape shape_of(const Solution &solution);
 /* The part of it that the firmware's fit uses with a pad profile: no width. */
 Shape without_width(Shape shape);
 /* The shape in the form of the fit: [sensor], or nothing. */
-std::vector<fit_own> own_of(const Array &array, const Shape &shape);
+std::vector<fit_deviation> own_of(const Array &array, const Shape &shape);
 
 /* Force over 2 pi p0 sigma^2 of the firmware's own fit to the readings over their gains, half a
  * second to a second after the weight was down. Rubber that relaxes reads more before and less

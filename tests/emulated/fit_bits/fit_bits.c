@@ -3,7 +3,7 @@
 #include "common/crc32.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
-#include "fit/fit_doubt.h"
+#include "fit/fit_bias.h"
 #include "fit/fit_shapes.h"
 #include "fit/fit_tangential.h"
 #include "support/draw.h"
@@ -136,7 +136,7 @@ static uint32_t bits_of_shapes(const struct fit_array *array, uint32_t usable, c
 uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   draw_from(UINT64_C(0x9E3779B97F4A7C15) * (press + 1) ^ (uint64_t)kernel);
   draw();
-  bool other = (kernel == FIT_BITS_GENERAL && press % 2) || (kernel == FIT_BITS_DOUBT && press % 16 == 1);
+  bool other = (kernel == FIT_BITS_GENERAL && press % 2) || (kernel == FIT_BITS_BIAS && press % 16 == 1);
   const struct fit_array *array = &layouts[other ? draw_between(1, LAYOUTS - 1) : 0];
 
   const bool on_a_pad = kernel == FIT_BITS_TANGENTIAL || kernel == FIT_BITS_SHAPES;
@@ -154,7 +154,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     settings.dip_sd_mm = (float)draw_between(4, 64);
   }
 
-  struct fit_own own[FT_MAX_SENSORS];
+  struct fit_deviation own[FT_MAX_SENSORS];
   if (press % 7 == 2) { /* on a pad so little that an estimate is still reported */
     const int32_t most_q15 = on_a_pad ? 300 : 9000;
     for (int k = 0; k < SENSORS_MOST; k++) {
@@ -162,7 +162,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
       own[k].off_y_q15 = draw_between(-most_q15 / 4, most_q15 / 4);
       own[k].wider_q15 = draw_between(-most_q15, most_q15);
     }
-    settings.own = own;
+    settings.deviations = own;
   }
 
   if (press % 2) {
@@ -198,7 +198,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   }
 
   uint32_t usable = UINT32_MAX;
-  const bool pulls = on_a_pad || kernel == FIT_BITS_DOUBT;
+  const bool pulls = on_a_pad || kernel == FIT_BITS_BIAS;
   if (pulls && press % 16 != 15) {
     pull(array, pressure_Pa_q10);
   }
@@ -221,14 +221,14 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
   } else if (kernel == FIT_BITS_GENERAL) {
     fit_general(array, pressure_Pa_q10, usable, &settings, &result);
-  } else if (kernel == FIT_BITS_DOUBT) {
-    struct fit_doubt load;
+  } else if (kernel == FIT_BITS_BIAS) {
+    struct fit_bias load;
     memset(&load, 0, sizeof load);
     fit_gaussian(array, pressure_Pa_q10, usable, &settings, &result);
-    for (int part = 0; part < FIT_DOUBT_PARTS; part++) {
-      fit_doubt_follow(&load, array, pressure_Pa_q10, &settings, &result);
+    for (int part = 0; part < FIT_BIAS_PARTS; part++) {
+      fit_bias_step(&load, array, pressure_Pa_q10, &settings, &result);
     }
-    fit_doubt_widen(&load, array, &settings, &result);
+    fit_bias_widen(&load, array, &settings, &result);
   }
   if (kernel == FIT_BITS_TANGENTIAL) {
     struct fit_tangential found[FRAMES];

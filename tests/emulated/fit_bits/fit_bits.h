@@ -11,7 +11,7 @@ enum fit_bits_kernel {
   FIT_BITS_GENERAL,    /* fit_general: the same and other layouts, any subset */
   FIT_BITS_TANGENTIAL, /* fit_tangential after fit_gaussian: pads of 5 to 20 mm, every sensor or not
                         */
-  FIT_BITS_DOUBT,      /* a look of fit_doubt after fit_gaussian: mostly the array of the firmware */
+  FIT_BITS_BIAS,       /* a look of fit_bias after fit_gaussian: mostly the array of the firmware */
   FIT_BITS_SHAPES,     /* fit_shapes after fit_gaussian: one press or two on 12 mm, every sensor or not */
   FIT_BITS_KERNELS
 };

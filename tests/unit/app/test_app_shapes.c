@@ -183,20 +183,20 @@ TEST(what_is_none_of_these_is_warned_of_all_the_time) {
 TEST(a_search_for_an_outlier_is_of_fast_frames) {
   put(1.5, -4.0, 5.0);
   last_of_press();
-  app.stages.location.watch = (struct fit_watch){.usable = app.found.conditioned.usable,
-                                                 .left_out = 1,
-                                                 .frames = 9,
-                                                 .residual_rms_Pa = app.found.fit.residual_rms_Pa,
-                                                 .force_N = app.found.fit.force_N};
+  app.stages.location.outliers = (struct fit_outlier_state){.usable = app.found.conditioned.usable,
+                                                            .left_out = 1,
+                                                            .frames = 9,
+                                                            .residual_rms_Pa = app.found.fit.residual_rms_Pa,
+                                                            .force_N = app.found.fit.force_N};
   app.found.frame.t_us += 765;
   app_process_frame(&app, app.found.frame.t_read_us);
-  TEST_ASSERT_EQUAL(8, app.stages.location.watch.frames);
+  TEST_ASSERT_EQUAL(8, app.stages.location.outliers.frames);
   TEST_ASSERT_EQUAL_HEX32(app.found.conditioned.usable & ~UINT32_C(1), app.found.fit.used);
   TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_SENSOR_MASKED, app.found.contact.flags);
   app.found.frame.t_us += 3700;
   app_process_frame(&app, app.found.frame.t_read_us);
   TEST_ASSERT_EQUAL_HEX32(app.found.conditioned.usable, app.found.fit.used);
-  TEST_ASSERT_EQUAL(0, app.stages.location.watch.left_out);
+  TEST_ASSERT_EQUAL(0, app.stages.location.outliers.left_out);
 }
 
 /* Here each frame has time for several frames' worth of parts. */

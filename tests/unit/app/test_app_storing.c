@@ -98,10 +98,10 @@ TEST(a_calibration_tells_the_fit_the_pads_shape) {
   TEST_ASSERT_EQUAL_FLOAT(0.06f, app.stages.location.settings.prior_width_mm);
   TEST_ASSERT_EQUAL_FLOAT(3277.0f / 65536.0f, app.stages.location.settings.dip_share);
   TEST_ASSERT_EQUAL_FLOAT(13.954f, app.stages.location.settings.dip_sd_mm);
-  TEST_ASSERT_INT_WITHIN(1, 328, app.stages.location.settings.own[3].off_x_q15);
-  TEST_ASSERT_INT_WITHIN(1, -655, app.stages.location.settings.own[3].off_y_q15);
-  TEST_ASSERT_EQUAL_INT(-1311, app.stages.location.settings.own[14].wider_q15);
-  TEST_ASSERT_EQUAL_INT(0, app.stages.location.settings.own[14].off_x_q15);
+  TEST_ASSERT_INT_WITHIN(1, 328, app.stages.location.settings.deviations[3].off_x_q15);
+  TEST_ASSERT_INT_WITHIN(1, -655, app.stages.location.settings.deviations[3].off_y_q15);
+  TEST_ASSERT_EQUAL_INT(-1311, app.stages.location.settings.deviations[14].wider_q15);
+  TEST_ASSERT_EQUAL_INT(0, app.stages.location.settings.deviations[14].off_x_q15);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, get_info().prior_width_mm);
   run_for(1100);
   TEST_ASSERT_FLOAT_WITHIN(0.003f, 0.01f, app.stages.contact_settings.force_scale_sd);
@@ -124,7 +124,7 @@ TEST(a_calibration_tells_the_fit_the_pads_shape) {
   obey((struct wire_packet){.type = WIRE_CMD_ERASE_CALIBRATION});
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.stages.location.settings.prior_width_mm);
   TEST_ASSERT_EQUAL_FLOAT(0.0f, app.stages.location.settings.dip_share);
-  TEST_ASSERT_NULL(app.stages.location.settings.own);
+  TEST_ASSERT_NULL(app.stages.location.settings.deviations);
 }
 
 static void set_all(void) {

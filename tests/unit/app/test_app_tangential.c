@@ -80,7 +80,7 @@ TEST(a_profile_tells_the_load_and_corrects_the_location) {
   TEST_ASSERT_TRUE(app.found.fit.x_mm > 1.5f + 0.5f);
   TEST_ASSERT_TRUE(app.found.fit.y_mm < -4.0f - 0.4f);
   TEST_ASSERT_TRUE(contact.q_sd_N > 0.0f && contact.location_sd_mm > 0.0f);
-  TEST_ASSERT_TRUE(app.found.fit.location_sd_mm < FIT_DOUBT_USUAL * 0.38f * 9.0f);
+  TEST_ASSERT_TRUE(app.found.fit.location_sd_mm < FIT_BIAS_ASSUMED_RATIO * 0.38f * 9.0f);
   TEST_ASSERT_FALSE(app.stages.doubt.force.known);
   TEST_ASSERT_EQUAL_FLOAT(app.found.fit.p0_Pa, contact.p0_Pa);
   TEST_ASSERT_EQUAL_FLOAT(app.found.fit.sigma_mm, contact.sigma_mm);
@@ -113,12 +113,12 @@ TEST(a_load_that_is_not_estimated_is_part_of_the_error) {
         continue;
       }
       frames++;
-      if (!slow && frames > FIT_DOUBT_PARTS / 2 && frames <= FIT_DOUBT_PARTS) {
+      if (!slow && frames > FIT_BIAS_PARTS / 2 && frames <= FIT_BIAS_PARTS) {
         continue; /* so sudden a press asks for a temperature, which gives it time */
       }
       const bool uncertain = (contact->flags & CONTACT_FLAG_UNCERTAIN) != 0;
-      if (frames <= (slow ? 1 : FIT_DOUBT_PARTS)) {
-        TEST_ASSERT_TRUE(contact->location_sd_mm > FIT_DOUBT_USUAL * 0.38f * 9.0f && uncertain);
+      if (frames <= (slow ? 1 : FIT_BIAS_PARTS)) {
+        TEST_ASSERT_TRUE(contact->location_sd_mm > FIT_BIAS_ASSUMED_RATIO * 0.38f * 9.0f && uncertain);
       } else if (loaded) {
         TEST_ASSERT_FLOAT_WITHIN(0.4f, contact->x_mm - 1.5f, contact->location_sd_mm);
         TEST_ASSERT_TRUE(contact->x_mm > 2.2f && uncertain);
@@ -126,7 +126,7 @@ TEST(a_load_that_is_not_estimated_is_part_of_the_error) {
         TEST_ASSERT_TRUE(contact->location_sd_mm < 0.6f && !uncertain);
       }
     }
-    TEST_ASSERT_GREATER_THAN(FIT_DOUBT_PARTS + 2, frames);
+    TEST_ASSERT_GREATER_THAN(FIT_BIAS_PARTS + 2, frames);
   }
 }
 

@@ -71,9 +71,9 @@ static void begin(void) {
   found.x_mm = between(-15.0f, 15.0f);
   found.y_mm = between(-25.0f, 25.0f);
   found.force_N = between(0.2f, 8.0f);
-  found.moved_q20_mm[0] = draw_between(-(8 << 20), 8 << 20);
-  found.moved_q20_mm[1] = draw_between(-(8 << 20), 8 << 20);
-  found.variance_per_pull = 1.0f;
+  found.shift_q20_mm[0] = draw_between(-(8 << 20), 8 << 20);
+  found.shift_q20_mm[1] = draw_between(-(8 << 20), 8 << 20);
+  found.variance_per_tangential = 1.0f;
 }
 
 static void draw_frame(int32_t period_us) {

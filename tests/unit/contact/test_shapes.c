@@ -31,7 +31,7 @@ static void has_middle(enum fit_shape shape) {
 }
 
 static void is_at(float x_mm, float y_mm, float sd_mm, const struct tangential_force *of) {
-  const struct shapes_place place = shapes_locate(&report, &fit, of);
+  const struct shapes_location place = shapes_locate(&report, &fit, of);
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, x_mm, place.x_mm);
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, y_mm, place.y_mm);
   TEST_ASSERT_FLOAT_WITHIN(2e-3f * sd_mm, sd_mm, place.location_sd_mm);
@@ -47,7 +47,7 @@ TEST(what_presses_is_where_the_load_or_the_Gaussian_has_it) {
 }
 
 TEST(what_the_gaussian_and_a_long_or_pulled_shape_differ_by_is_part_of_the_error) {
-  static const enum fit_shape shapes[] = {FIT_SHAPE_PULLED, FIT_SHAPE_ELONGATED};
+  static const enum fit_shape shapes[] = {FIT_SHAPE_TANGENTIAL, FIT_SHAPE_ELONGATED};
   for (unsigned i = 0; i < sizeof shapes / sizeof shapes[0]; i++) {
     has_middle(shapes[i]);
     is_at(2.0f, -5.0f, 1.15758f, NULL); /* 0.3, 1 and 0.5 mm */
@@ -62,7 +62,7 @@ TEST(what_the_load_and_a_long_shape_differ_by_is_part_of_the_error) {
   is_at(4.0f, -8.0f, 4.62709f, &load); /* 0.4, 3 and 3.5 mm */
   load.x_mm = 0.0f;
   is_at(0.0f, -8.0f, 3.66197f, &load); /* 0.4, 1 and 3.5 mm */
-  report.shape = FIT_SHAPE_PULLED;     /* the load's estimate knows that */
+  report.shape = FIT_SHAPE_TANGENTIAL; /* the load's estimate knows that */
   is_at(0.0f, -8.0f, 0.4f, &load);
 }
 

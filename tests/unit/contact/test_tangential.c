@@ -12,8 +12,8 @@ static struct contact_result result;
 static struct tangential_force load;
 
 void setUp(void) {
-  settings =
-      (struct tangential_settings){.force_scale = 1.0f, .tangential_scale = 1.0f, .place_square_q26 = 167772, .location_sd_limit_mm = 0.6f};
+  settings = (struct tangential_settings){
+      .force_scale = 1.0f, .tangential_scale = 1.0f, .location_variance_q26 = 167772, .location_sd_limit_mm = 0.6f};
   tangential_reset(&history);
   found = (struct fit_tangential){.valid = true,
                                   .x_mm = 2.5f,
@@ -24,7 +24,7 @@ void setUp(void) {
                                   .qx_N = 0.75f,
                                   .qy_N = -1.0f,
                                   .q_sd_N = 0.04f,
-                                  .variance_per_pull = 1.0f};
+                                  .variance_per_tangential = 1.0f};
   input = (struct contact_input){.t_us = 5000000, .contact = true, .tangential = &found};
 }
 
@@ -75,7 +75,7 @@ TEST(an_estimate_passes_as_it_is_with_scales_of_one) {
 
 #define MOVED_mm 3.5
 
-static void use_moved(void) { found.moved_q20_mm[0] = found.moved_q20_mm[1] = (int32_t)(MOVED_mm * 1048576.0); }
+static void use_moved(void) { found.shift_q20_mm[0] = found.shift_q20_mm[1] = (int32_t)(MOVED_mm * 1048576.0); }
 
 /* A load of 0.1 either way is usual; one that the estimate hardly sees is likely none. */
 TEST(a_small_load_may_be_none_and_the_place_knows_it) {
@@ -109,7 +109,7 @@ TEST(a_misfit_widens_what_goes_as_it_widens_the_place) {
   found.q_sd_N = 0.2f;
   float taken[2];
   for (int i = 0; i < 2; i++) {
-    found.variance_per_pull = 1.0f + 1.25f * (float)i;
+    found.variance_per_tangential = 1.0f + 1.25f * (float)i;
     update(0);
     taken[i] = 0.25f + 0.0025f - load.location_sd_mm * load.location_sd_mm;
   }
@@ -241,7 +241,7 @@ static float place_sd_mm(float overhang_mm, int32_t off_um) {
   struct pad_profile pad = pad_of_12_mm();
   pad.overhang_mm = overhang_mm;
   tangential_use(&settings, &pad, &(struct contact_settings){.force_scale = 1.0f}, off_um);
-  return sqrtf((float)settings.place_square_q26 / 67108864.0f);
+  return sqrtf((float)settings.location_variance_q26 / 67108864.0f);
 }
 
 TEST(places_and_ends_are_in_the_sd_of_a_location) {

@@ -13,15 +13,15 @@ struct contact {
 struct pad_press {
   struct pad_profile profile;
   double dip_share, dip_sd_mm; /* of the height in the middle of a contact of the profile's spread */
-  struct fit_own own[GRID_SENSORS];
+  struct fit_deviation deviations[GRID_SENSORS];
 };
 
 /* As common/pad_profile.h has it. A sensor that measures all wider by a factor reads what is nearer by it. */
 static inline double pad_press_Pa(const struct pad_press *pad, const struct contact *contact, int sensor) {
-  const struct fit_own *own = &pad->own[sensor];
-  const double nearer = exp(-own->wider_q15 / 32768.0);
-  const double dx = nearer * (9.0 * (sensor / 5 - 1 + own->off_x_q15 / 32768.0) - contact->x_mm);
-  const double dy = nearer * (9.0 * (sensor % 5 - 2 + own->off_y_q15 / 32768.0) - contact->y_mm);
+  const struct fit_deviation *deviation = &pad->deviations[sensor];
+  const double nearer = exp(-deviation->wider_q15 / 32768.0);
+  const double dx = nearer * (9.0 * (sensor / 5 - 1 + deviation->off_x_q15 / 32768.0) - contact->x_mm);
+  const double dy = nearer * (9.0 * (sensor % 5 - 2 + deviation->off_y_q15 / 32768.0) - contact->y_mm);
   const double r2 = dx * dx + dy * dy;
   const double usual_mm2 = (double)pad->profile.spread_mm2, square_mm2 = pad->dip_sd_mm * pad->dip_sd_mm;
   double sum = 0.0, middle = 0.0;
@@ -43,9 +43,10 @@ static inline double pad_press_Pa(const struct pad_press *pad, const struct cont
 }
 
 /* Every sensor off its place and wider by at most these. */
-static inline void pad_press_draw_own(struct pad_press *pad, int32_t off_q15, int32_t wider_q15, struct random *random) {
+static inline void pad_press_draw_deviations(struct pad_press *pad, int32_t off_q15, int32_t wider_q15, struct random *random) {
   for (int k = 0; k < GRID_SENSORS; k++) {
-    pad->own[k] = (struct fit_own){(int32_t)random_between(random, -off_q15, off_q15), (int32_t)random_between(random, -off_q15, off_q15),
-                                   (int32_t)random_between(random, -wider_q15, wider_q15)};
+    pad->deviations[k] =
+        (struct fit_deviation){(int32_t)random_between(random, -off_q15, off_q15), (int32_t)random_between(random, -off_q15, off_q15),
+                               (int32_t)random_between(random, -wider_q15, wider_q15)};
   }
 }

@@ -64,7 +64,7 @@ static bool learn(void) { return fit_gains_learn(&gains, &array, readings, &sett
 
 /* Two frames. Whether it counts. */
 static bool hold(struct touch touch) {
-  fit_gains_lift(&gains);
+  fit_gains_end_touch(&gains);
   measure(touch);
   TEST_ASSERT_FALSE(learn());
   measure(touch);
@@ -146,7 +146,7 @@ TEST(test_eight_sensors_or_a_strip_learn_nothing) {
       y_mm[k] = 9.0f * (float)(strip ? k - 7 : k % 4);
     }
     TEST_ASSERT_EQUAL(FT_OK, fit_array_init(&array, count, x_mm, y_mm, 9.0f));
-    fit_gains_lift(&gains);
+    fit_gains_end_touch(&gains);
     for (int frame = 0; frame < 2; frame++) {
       measure(strip ? (struct touch){14000.0, 5.6, 0.0, 0.0} : (struct touch){14000.0, 5.6, 5.0, 14.0});
       TEST_ASSERT_BITS_HIGH(CONTACT_FLAG_FIT_VALID, result.flags);

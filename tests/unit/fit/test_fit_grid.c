@@ -200,8 +200,7 @@ TEST(more_iterations_come_nearer) {
   TEST_ASSERT_TRUE(mean_um[7] < 0.05f && mean_um[8] < 0.05f);
 }
 
-/* What the last step moved is not settled, and the standard deviation contains it. Up to two iterations of the grid
- * kernel are all of one kind, so that one more is one more step. */
+/* The standard deviation contains the last step. Up to two iterations of the grid kernel are of one kind: one more is one more step. */
 TEST(a_fit_that_still_moves_states_how_far) {
   for (int general = 0; general < 2; general++) {
     int moving = 0;
@@ -309,18 +308,18 @@ static double share_at_end(double half_mm, double at_mm, double place_mm) {
   return fabs(place_mm) > half_mm - 1.0 ? 1.0 - fmin(fmax(lacking, 0.0), 0.5) : 1.0;
 }
 
-/* A contact of 30 kPa on rubber with a dip, measured with 2 Pa of noise by sensors that have this own. */
-static void press_cast(double x, double y, double sigma, double share, double sd, const struct fit_own *own) {
+/* A contact of 30 kPa on rubber with a dip, measured with 2 Pa of noise by sensors with these deviations. */
+static void press_cast(double x, double y, double sigma, double share, double sd, const struct fit_deviation *deviations) {
   for (int k = 0; k < SENSORS; k++) {
-    double dx = (double)x_mm[k] + (double)PITCH_mm * own[k].off_x_q15 / 32768.0 - x;
-    double dy = (double)y_mm[k] + (double)PITCH_mm * own[k].off_y_q15 / 32768.0 - y;
-    double square = dx * dx + dy * dy, wide = sigma * exp(own[k].wider_q15 / 32768.0);
+    double dx = (double)x_mm[k] + (double)PITCH_mm * deviations[k].off_x_q15 / 32768.0 - x;
+    double dy = (double)y_mm[k] + (double)PITCH_mm * deviations[k].off_y_q15 / 32768.0 - y;
+    double square = dx * dx + dy * dy, wide = sigma * exp(deviations[k].wider_q15 / 32768.0);
     double there = share_at_end(HALF_X_mm, x - 1.5, (double)x_mm[k] - 1.5) * share_at_end(HALF_Y_mm, y + 0.25, (double)y_mm[k] + 0.25);
     double p = exp(-square / (2 * wide * wide)) - (sigma < 4.95 ? there : 1.0) * share * exp(-square / (2 * sd * sd));
     readings[k] = (int32_t)nearbyint(1024.0 * (3e4 * p + 2.0 * random_normal(&random)));
   }
 }
-static const struct fit_own no_own[SENSORS];
+static const struct fit_deviation no_deviations[SENSORS];
 
 /* What a calibration knows of such a pad. */
 static struct fit_settings of_cast(double sigma, double share, double sd) {
@@ -333,11 +332,11 @@ static struct fit_settings of_cast(double sigma, double share, double sd) {
 }
 
 /* Up to 0.16 mm each way, and 5 % of the width. */
-static void draw_own(struct fit_own *own) {
+static void draw_deviations(struct fit_deviation *deviations) {
   for (int k = 0; k < SENSORS; k++) {
-    own[k].off_x_q15 = (int32_t)any(-600.0, 600.0);
-    own[k].off_y_q15 = (int32_t)any(-600.0, 600.0);
-    own[k].wider_q15 = (int32_t)any(-1638.0, 1638.0);
+    deviations[k].off_x_q15 = (int32_t)any(-600.0, 600.0);
+    deviations[k].off_y_q15 = (int32_t)any(-600.0, 600.0);
+    deviations[k].wider_q15 = (int32_t)any(-1638.0, 1638.0);
   }
 }
 
@@ -356,7 +355,7 @@ TEST(a_known_dip_is_added_back_alike_in_all) {
   float worst = 0.0f, apart = 0.0f, unknown = 0.0f;
   for (int i = 0; i < 400; i++) {
     const double x = any_x(), y = any_y(), sigma = any(5.2, 6.0), sd = 3.2 * sigma;
-    press_cast(x, y, sigma, 0.03, sd, no_own);
+    press_cast(x, y, sigma, 0.03, sd, no_deviations);
     struct fit_settings settings = of_cast(sigma, 0.0, sd);
     settings.cut_noises = 4;
     const struct fit_result plain = by_grid(&settings);
@@ -377,7 +376,7 @@ TEST(beyond_the_sensors_the_dip_shows_the_place) {
   for (int i = 0; i < PRESSES; i++) {
     const double x = 1.5 + (i % 2 ? -1.0 : 1.0) * (HALF_X_mm + any(0.5, 3.0)), y = any_y();
     const double sigma = any(2.8, 3.6), sd = 3.2 * sigma;
-    press_cast(x, y, sigma, 0.035, sd, no_own);
+    press_cast(x, y, sigma, 0.035, sd, no_deviations);
     const struct fit_settings settings = of_cast(sigma, 0.035, sd);
     const struct fit_result found = by_gaussian(&settings), wide = by_grid(&settings), general = by_general(ALL, &settings);
     far += off_mm(&found, x, y) > 0.5f;
@@ -394,25 +393,25 @@ TEST(what_is_the_sensors_own_is_taken_out_alike_in_all) {
   float worst = 0.0f, apart = 0.0f, unknown = 0.0f;
   int rough = 0;
   for (int i = 0; i < 400; i++) {
-    struct fit_own own[SENSORS];
-    draw_own(own);
+    struct fit_deviation deviations[SENSORS];
+    draw_deviations(deviations);
     const double x = any_x(), y = any_y(), sigma = any(5.2, 7.0), sd = 3.0 * sigma, share = i % 2 ? 0.02 : 0.0;
-    press_cast(x, y, sigma, share, sd, own);
+    press_cast(x, y, sigma, share, sd, deviations);
     struct fit_settings settings = of_cast(sigma, share, sd);
     const struct fit_result plain = by_grid(&settings);
-    settings.own = own;
+    settings.deviations = deviations;
     judge(&settings, x, y, &worst, &apart);
     unknown += off_mm(&plain, x, y) / 400.0f;
     rough += by_grid(&settings).residual_rms_Pa > 0.5f * plain.residual_rms_Pa;
-    struct fit_result lacking[2]; /* what is the own of a missing sensor changes nothing */
+    struct fit_result lacking[2]; /* the deviations of a missing sensor change nothing */
     for (int other = 0; other < 2; other++) {
-      own[0].wider_q15 = 3000 * other;
+      deviations[0].wider_q15 = 3000 * other;
       lacking[other] = by_masked(WITHOUT(0), &settings);
     }
     TEST_ASSERT_EQUAL_MEMORY(&lacking[0], &lacking[1], RESULT_BYTES);
     settings.iterations = 2; /* too few to know the contact before it */
     const struct fit_result early[] = {by_grid(&settings), by_masked(ALL, &settings), by_general(ALL, &settings)};
-    settings.own = NULL;
+    settings.deviations = NULL;
     const struct fit_result without[] = {by_grid(&settings), by_masked(ALL, &settings), by_general(ALL, &settings)};
     for (int each = 0; each < 3; each++) {
       TEST_ASSERT_EQUAL_MEMORY(&early[each], &without[each], RESULT_BYTES);
@@ -426,13 +425,13 @@ TEST(what_is_the_sensors_own_is_taken_out_alike_in_all) {
 TEST(a_sensor_that_is_known_to_differ_is_no_outlier) {
   int left_out[2] = {0};
   for (int i = 0; i < 200; i++) {
-    struct fit_own own[SENSORS] = {{0}};
-    own[random_below(&random, SENSORS)].wider_q15 = 3277; /* 10 % */
+    struct fit_deviation deviations[SENSORS] = {{0}};
+    deviations[random_below(&random, SENSORS)].wider_q15 = 3277; /* 10 % */
     const double x = 1.5 + any(-4.0, 4.0);
-    press_cast(x, -0.25 + any(-4.0, 4.0), 6.0, 0.0, 1.0, own);
+    press_cast(x, -0.25 + any(-4.0, 4.0), 6.0, 0.0, 1.0, deviations);
     struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = 2048};
     for (int known = 0; known < 2; known++) {
-      settings.own = known ? own : NULL;
+      settings.deviations = known ? deviations : NULL;
       left_out[known] += by_gaussian(&settings).used != ALL;
     }
   }
@@ -444,13 +443,13 @@ TEST(an_outlier_is_found_among_sensors_that_differ) {
   enum { PRESSES = 400 };
   int found = 0, others = 0;
   for (int i = 0; i < PRESSES; i++) {
-    struct fit_own own[SENSORS];
-    draw_own(own);
+    struct fit_deviation deviations[SENSORS];
+    draw_deviations(deviations);
     const double x = 1.5 + any(-4.0, 4.0);
-    press_cast(x, -0.25 + any(-4.0, 4.0), 6.0, 0.0, 1.0, own);
+    press_cast(x, -0.25 + any(-4.0, 4.0), 6.0, 0.0, 1.0, deviations);
     const uint32_t outlier = random_below(&random, SENSORS);
     readings[outlier] += 5000 * 1024;
-    const struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = 2048, .own = own};
+    const struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = 2048, .deviations = deviations};
     const sensor_map used = by_gaussian(&settings).used;
     found += used == WITHOUT(outlier);
     others += used != ALL && (used >> outlier & 1);

@@ -6,7 +6,7 @@
 #include "condition/plausibility.h"
 #include "contact/motion.h"
 #include "contact/shapes.h"
-#include "fit/fit_doubt.h"
+#include "fit/fit_bias.h"
 #include "fit/fit_gains.h"
 #include "pad_press.h"
 
@@ -175,11 +175,11 @@ static struct input draw(uint32_t number, const struct fit_array *on) {
     settings->dip_sd_mm = any ? any_float(&random) : (float)random_between(&random, 1.0, 100.0);
   }
   if (random_below(&random, 4) == 0) {
-    static struct fit_own own[FT_MAX_SENSORS];
+    static struct fit_deviation own[FT_MAX_SENSORS];
     for (int k = 0; k < SENSORS_MOST; k++) {
-      own[k] = (struct fit_own){any_q15(&random), any_q15(&random), any_q15(&random)};
+      own[k] = (struct fit_deviation){any_q15(&random), any_q15(&random), any_q15(&random)};
     }
-    settings->own = own;
+    settings->deviations = own;
   }
   switch (random_below(&random, 4)) {
   case 0:
@@ -282,8 +282,8 @@ static uint32_t calls;
 /* All that is kept of one fingertip, and what is new in a frame. */
 static struct {
   struct random random;
-  struct fit_watch watch;
-  struct fit_doubt doubt;
+  struct fit_outlier_state outliers;
+  struct fit_bias bias;
   struct fit_gains gains;
   struct fit_settings settings;
   struct fit_result fit;
@@ -348,8 +348,8 @@ static void begin(uint32_t number) {
   tip.shapes.array = tip.tangential.array = &arrays[below(2) ? 0 : 3 + below(RECTANGLES - 3)];
   draw_pad();
   fit_gains_begin(&tip.gains, (float)any(0.0, 0.5));
-  fit_gains_lift(&tip.gains);
-  fit_doubt_begin(&tip.doubt);
+  fit_gains_end_touch(&tip.gains);
+  fit_bias_begin(&tip.bias);
   tangential_reset(&tip.history);
   tip.scales.location_sd_limit_mm = FIT_LOCATION_SD_LIMIT_mm;
   condition_start(&tip.condition);
@@ -403,10 +403,10 @@ static void fit_any(uint32_t number, const struct input *input, bool begins) {
     plain[k](input->array, readings, input->usable, settings, &fit);
     judge(number, "a kernel of the grid", input, &fit);
   }
-  struct fit_watch watch = tip.watch;
-  fit_gaussian_grid_follow(input->array, readings, input->usable, settings, &watch, &fit);
-  fit_gaussian_follow(input->array, readings, input->usable, settings, &tip.watch, &fit);
-  fit_doubt_widen(&tip.doubt, input->array, settings, &fit);
+  struct fit_outlier_state outliers = tip.outliers;
+  fit_gaussian_grid_update(input->array, readings, input->usable, settings, &outliers, &fit);
+  fit_gaussian_update(input->array, readings, input->usable, settings, &tip.outliers, &fit);
+  fit_bias_widen(&tip.bias, input->array, settings, &fit);
   tip.fit = fit;
   tip.tangential.question = (struct tangential_question){begins, 0, tip.frame.t_us, readings, settings, &tip.fit};
   tangential_estimate(&tip.tangential);
@@ -429,8 +429,9 @@ static void fit_any(uint32_t number, const struct input *input, bool begins) {
   tangential_update(&tip.history, &tip.scales, &of_frame, &result, &force);
   motion_update(&tip.motion, &tip.scales, &of_frame, &result, &motion);
   const struct contact_force weighed = contact_weigh(&scales, &fit, 1e9f);
-  const struct shapes_place place = shapes_locate(&tip.shapes.report, &fit, result.flags & CONTACT_FLAG_TANGENTIAL_VALID ? &force : NULL);
-  fit_doubt_follow(&tip.doubt, input->array, readings, settings, &fit);
+  const struct shapes_location place =
+      shapes_locate(&tip.shapes.report, &fit, result.flags & CONTACT_FLAG_TANGENTIAL_VALID ? &force : NULL);
+  fit_bias_step(&tip.bias, input->array, readings, settings, &fit);
   fit_gains_learn(&tip.gains, input->array, readings, settings, &fit);
   const struct fit_tangential *found = &tip.tangential.estimate;
   bool good = are_finite(&found->x_mm, 9 * sizeof(float)) && FINITE(force) && FINITE(weighed) && FINITE(motion) && FINITE(place) &&

@@ -60,7 +60,7 @@ static struct fit_settings usual(void) {
   fit_set_errors(&settings, 0.01f, 0.0065f);
   settings.dip_share = (float)rubber.dip_share;
   settings.dip_sd_mm = 14.0f;
-  settings.own = rubber.own;
+  settings.deviations = rubber.deviations;
   return settings;
 }
 
@@ -116,7 +116,7 @@ TEST(test_a_round_press_is_one_at_its_place_and_force) {
 TEST(test_what_is_the_sensors_own_is_taken_out) {
   int right[2] = {0}; /* round, pairs */
   for (int i = 0; i < 100; i++) {
-    pad_press_draw_own(&rubber, 600, 2000, &noise);
+    pad_press_draw_deviations(&rubber, 600, 2000, &noise);
     double x = any(-6.0, 6.0);
     clear();
     press(x, i % 2 ? -8.0 : any(-16.0, 16.0), 6.0);
@@ -136,7 +136,7 @@ TEST(test_a_pull_is_no_pair) {
     clear();
     pull(x, y, 6.0, qx, qy);
     held();
-    TEST_ASSERT_EQUAL(FIT_SHAPE_PULLED, result.shape);
+    TEST_ASSERT_EQUAL(FIT_SHAPE_TANGENTIAL, result.shape);
     TEST_ASSERT_FLOAT_WITHIN(0.6f, (float)x, result.x_mm[0]);
     TEST_ASSERT_FLOAT_WITHIN(0.6f, (float)y, result.y_mm[0]);
     TEST_ASSERT_FLOAT_WITHIN(0.8f, (float)qx, result.qx_N);
@@ -333,7 +333,7 @@ static void assert_limit(int32_t limit, int32_t of_pair) {
 }
 
 TEST(test_more_unknowns_must_explain_more) {
-  const int32_t unexplained[] = {0, FREEDOM << 8, (4 * FREEDOM) << 8};
+  const int32_t unexplained[] = {0, DEGREES_OF_FREEDOM << 8, (4 * DEGREES_OF_FREEDOM) << 8};
   const int32_t most = 1 << 30; /* chi^2 is no larger */
   set_pair(ONE_Q20 / 2, ONE_Q20 / 2);
   for (int i = 0; i < 3; i++) {
@@ -341,14 +341,14 @@ TEST(test_more_unknowns_must_explain_more) {
   }
   TEST_ASSERT_EQUAL(ROUND, best(most, most, most)); /* what no model explains */
   set_pair(0, 0);
-  TEST_ASSERT_EQUAL(ROUND, best(limit_q8(FREEDOM << 8), FREEDOM << 8, 0));
-  TEST_ASSERT_EQUAL(LONG, best(limit_q8(FREEDOM << 8) + 1, FREEDOM << 8, 0));
+  TEST_ASSERT_EQUAL(ROUND, best(limit_q8(DEGREES_OF_FREEDOM << 8), DEGREES_OF_FREEDOM << 8, 0));
+  TEST_ASSERT_EQUAL(LONG, best(limit_q8(DEGREES_OF_FREEDOM << 8) + 1, DEGREES_OF_FREEDOM << 8, 0));
 }
 
 /* 25 mm at a pitch of 9 mm, as a pair across the array looks. */
 TEST(test_a_pair_that_looks_too_long_may_explain_a_little_less) {
   const int32_t half = 11 * (ONE_Q20 / 8), step = ONE_Q20 / 512;
-  const int32_t of_line = FREEDOM << 8, most = of_line + (of_line + (FIT_SHAPES_ERRORS << 8)) / 8;
+  const int32_t of_line = DEGREES_OF_FREEDOM << 8, most = of_line + (of_line + (FIT_SHAPES_ERRORS << 8)) / 8;
   for (int axis = SPAN_X; axis <= SPAN_Y; axis++) {
     set_pair(ONE_Q20 / 2, 0);
     straight[axis] = half;
@@ -383,10 +383,10 @@ TEST(test_a_pair_is_apart_and_on_the_array) {
     fit_use_rectangle(&grid);
     set_pair(0, 0);
     pair[SPAN_X + axis] = side * half;
-    pair[PLACE_X] = pair[PLACE_Y] = -even * half;
-    pair[PLACE_X + axis] += sign * ((axis ? grid.rows : grid.columns) * half - half - 1);
+    pair[LOCATION_X] = pair[LOCATION_Y] = -even * half;
+    pair[LOCATION_X + axis] += sign * ((axis ? grid.rows : grid.columns) * half - half - 1);
     TEST_ASSERT_TRUE(is_two());
-    pair[PLACE_X + axis] += 3 * sign;
+    pair[LOCATION_X + axis] += 3 * sign;
     TEST_ASSERT_FALSE(is_two());
   }
 }
@@ -399,7 +399,7 @@ TEST(test_a_place_is_held_as_far_beside_each_side) {
     float x_mm[16], y_mm[16];
     int32_t pressure_Pa_q10[16];
     const float side = i & 2 ? 1.0f : -1.0f;
-    settings.own = NULL;
+    settings.deviations = NULL;
     for (int k = 0; k < 16; k++) {
       x_mm[k] = 9.0f * ((float)(k / 4) - 1.5f);
       y_mm[k] = 9.0f * ((float)(k % 4) - 1.5f);
@@ -413,7 +413,7 @@ TEST(test_a_place_is_held_as_far_beside_each_side) {
     fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
     *(i & 1 ? &fit.y_mm : &fit.x_mm) += side * 50.0f;
     fit_shapes(&array, &pad, pressure_Pa_q10, &settings, &fit, &state, &result);
-    const int32_t place_q20 = state.at[ROUND].value[i & 1 ? PLACE_Y : PLACE_X] + ONE_Q20 / 2;
+    const int32_t place_q20 = state.at[ROUND].value[i & 1 ? LOCATION_Y : LOCATION_X] + ONE_Q20 / 2;
     TEST_ASSERT_INT32_WITHIN(ONE_Q20 / 4, (int32_t)side * 3 * ONE_Q20, place_q20);
   }
 }

@@ -1,5 +1,5 @@
-/* The tangential estimate against readings that its own model makes, and at the edges of what it takes.
- * tests/accuracy holds it to an estimator of its own in double precision. */
+/* The tangential estimate against readings of its own model, and at the limits of its input.
+ * tests/accuracy compares it with a separate estimator in double precision. */
 #include "fit/fit_tangential.h"
 #include "pad_press.h"
 
@@ -146,15 +146,15 @@ TEST(test_a_dip_that_is_known_is_in_the_model) {
 
 TEST(test_what_is_the_sensors_own_is_taken_out) {
   random = (struct random){UINT64_C(7)};
-  pad_press_draw_own(&rubber, 600, 1600, &random); /* 0.16 mm, 5 % */
-  settings.own = rubber.own;
+  pad_press_draw_deviations(&rubber, 600, 1600, &random); /* 0.16 mm, 5 % */
+  settings.deviations = rubber.deviations;
   judge_pad(12.0, ALL, 0.08, 0.01, 260, 0);
   judge_pad(12.0, ALL & ~(1 << 7), 0.1, 0.015, 260, 0);
 }
 
 static const struct contact usual = {2.0, 3.0, 5.0, 0.5, -0.3, 4.0};
 
-/* moved_q20_mm: noise that makes a load seem larger moves the place by so much. */
+/* shift_q20_mm: noise that makes a load seem larger moves the place by so much. */
 TEST(test_place_and_load_err_together_as_is_said) {
   enum { TIMES = 1000 };
   int32_t exact[SENSORS], readings[SENSORS];
@@ -177,7 +177,7 @@ TEST(test_place_and_load_err_together_as_is_said) {
     }
   }
   for (int i = 0; i < 2; i++) {
-    double said_mm = at.moved_q20_mm[i] / 1048576.0;
+    double said_mm = at.shift_q20_mm[i] / 1048576.0;
     TEST_ASSERT_DOUBLE_WITHIN(0.3, by[i][i] / square[i], said_mm);
     TEST_ASSERT_TRUE(fabs(said_mm) > 2.0);
     TEST_ASSERT_DOUBLE_WITHIN(0.5, 0.0, by[i][1 - i] / square[i]);
@@ -287,7 +287,7 @@ TEST(test_nothing_stays_from_another_frame) {
   for (int i = 0; i < 100; i++) {
     read_any(0.3, other);
     estimate(other, ALL & ~(1u << random_below(&random, SENSORS)));
-    memset(&pad.room, (int)random_below(&random, 256), sizeof pad.room);
+    memset(&pad.work, (int)random_below(&random, 256), sizeof pad.work);
     struct fit_tangential again = estimate(readings, ALL);
     TEST_ASSERT_EQUAL_MEMORY(&found, &again, sizeof found);
   }

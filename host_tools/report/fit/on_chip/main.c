@@ -3,7 +3,7 @@
 #include "alternatives/alternatives.h"
 #include "config/geometry.h"
 #include "fit/fit.h"
-#include "fit/fit_doubt.h"
+#include "fit/fit_bias.h"
 #include "fit/fit_gains.h"
 #include "fit/fit_shapes.h"
 #include "fit/fit_tangential.h"
@@ -31,13 +31,13 @@ enum { CALL_NEXT_JOB = 1, CALL_START = 2, CALL_STOP = 3 };
   } while (0)
 
 static struct fit_array layout;
-static struct fit_own own[FT_MAX_SENSORS];
+static struct fit_deviation own[FT_MAX_SENSORS];
 static struct fit_settings chosen;
 static struct fit_result contact;
 static struct fit_pad pad;
 static struct fit_tangential_state tangential_state;
 static struct fit_tangential tangential_result;
-static struct fit_doubt doubt;
+static struct fit_bias bias;
 static struct fit_gains gains;
 static struct fit_shapes_pad shapes_pad;
 static struct fit_shapes_state shapes_state;
@@ -97,8 +97,8 @@ static void tangential(void) {
   answer(tangential_result.x_mm, tangential_result.y_mm);
 }
 
-static void begin_doubt(void) { fit_doubt_begin(&doubt); }
-static void follow_doubt(void) { fit_doubt_follow(&doubt, &layout, job.pressure_Pa_q10, &chosen, &contact); }
+static void begin_bias(void) { fit_bias_begin(&bias); }
+static void step_bias(void) { fit_bias_step(&bias, &layout, job.pressure_Pa_q10, &chosen, &contact); }
 
 /* A touch that rests. */
 static void begin_gains(void) {
@@ -140,12 +140,12 @@ static const struct {
     {lm_float, NULL, 0},
     {lm_double, NULL, 0},
     {tangential, begin_tangential, FIT_TANGENTIAL_FRAMES - 1},
-    {follow_doubt, begin_doubt, 0},
-    {follow_doubt, begin_doubt, 1},
-    {follow_doubt, begin_doubt, 2},
-    {follow_doubt, begin_doubt, 3},
-    {follow_doubt, begin_doubt, 4},
-    {follow_doubt, begin_doubt, 5},
+    {step_bias, begin_bias, 0},
+    {step_bias, begin_bias, 1},
+    {step_bias, begin_bias, 2},
+    {step_bias, begin_bias, 3},
+    {step_bias, begin_bias, 4},
+    {step_bias, begin_bias, 5},
     {gains_of_touch, begin_gains, 0},
     {shapes, begin_shapes, 0}, /* a contact's first frame */
     {shapes, begin_shapes, 1},
@@ -160,7 +160,7 @@ int main(void) {
     port_panic();
   }
   for (int k = 0; k < FT_MAX_SENSORS; k++) { /* so little that it spoils no press */
-    own[k] = (struct fit_own){12, -12, k % 2 ? 40 : -40};
+    own[k] = (struct fit_deviation){12, -12, k % 2 ? 40 : -40};
     chosen.past_sd_Pa_q10[k] = 1024 * k;
   }
   for (;;) {
@@ -171,7 +171,7 @@ int main(void) {
     }
     chosen.iterations = (uint8_t)job.iterations;
     chosen.noise_Pa_q10 = job.noise_Pa_q10;
-    chosen.own = job.own ? own : NULL;
+    chosen.deviations = job.own ? own : NULL;
     void (*run)(void) = kernels[job.kernel].run;
     if (kernels[job.kernel].begin) {
       fit();

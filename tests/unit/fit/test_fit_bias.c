@@ -1,6 +1,6 @@
 /* A tangential force that is not estimated: its trace in the residual, and what that makes of the error. */
 #include "common/contact_flags.h"
-#include "fit/fit_doubt.h"
+#include "fit/fit_bias.h"
 #include "pad_press.h"
 
 #define SENSORS GRID_SENSORS
@@ -13,13 +13,13 @@ static struct pad_press rubber;
 static int32_t readings[SENSORS];
 static struct fit_settings settings;
 static struct fit_result result;
-static struct fit_doubt doubt;
+static struct fit_bias bias;
 
 void setUp(void) {
   make_grid_of_15(&array);
   noise = (struct random){UINT64_C(20221015)};
   rubber = (struct pad_press){.profile = pad_of_12_mm()};
-  doubt = (struct fit_doubt){0};
+  bias = (struct fit_bias){0};
   settings = (struct fit_settings){.iterations = 4, .noise_Pa_q10 = (int32_t)(1024 * NOISE_Pa)};
   fit_set_errors(&settings, 0.015f, 0.0065f);
 }
@@ -37,15 +37,15 @@ static void press(double x_mm, double y_mm, double qx, double qy) {
 
 static void fit(void) { fit_gaussian(&array, readings, ALL, &settings, &result); }
 
-static void widen(void) { fit_doubt_widen(&doubt, &array, &settings, &result); }
+static void widen(void) { fit_bias_widen(&bias, &array, &settings, &result); }
 
-static void follow(void) { fit_doubt_follow(&doubt, &array, readings, &settings, &result); }
+static void follow(void) { fit_bias_step(&bias, &array, readings, &settings, &result); }
 
 /* A press that is held until the search has ended. */
 static void hold(uint32_t usable) {
-  doubt = (struct fit_doubt){0};
+  bias = (struct fit_bias){0};
   fit_gaussian(&array, readings, usable, &settings, &result);
-  for (int part = 0; part < FIT_DOUBT_PARTS; part++) {
+  for (int part = 0; part < FIT_BIAS_PARTS; part++) {
     follow();
   }
   widen();
@@ -90,17 +90,17 @@ TEST(test_before_the_first_search_a_force_is_assumed) {
   fit();
   const struct fit_result fitted = result;
   for (int contact = 0; contact < 2; contact++) {
-    for (int part = 0; part < FIT_DOUBT_PARTS; part++) {
+    for (int part = 0; part < FIT_BIAS_PARTS; part++) {
       result = fitted;
       widen();
-      TEST_ASSERT_FLOAT_WITHIN(0.01f, hypotf(fitted.location_sd_mm, FIT_DOUBT_USUAL * 0.38f * 9.0f), result.location_sd_mm);
+      TEST_ASSERT_FLOAT_WITHIN(0.01f, hypotf(fitted.location_sd_mm, FIT_BIAS_ASSUMED_RATIO * 0.38f * 9.0f), result.location_sd_mm);
       TEST_ASSERT_TRUE(is_uncertain());
       follow();
     }
     result = fitted;
     widen();
     TEST_ASSERT_TRUE(result.location_sd_mm < fitted.location_sd_mm + 0.1f);
-    fit_doubt_begin(&doubt);
+    fit_bias_begin(&bias);
   }
 }
 
@@ -108,23 +108,22 @@ TEST(test_before_the_first_search_a_force_is_assumed) {
 TEST(test_a_search_does_not_mix_frames) {
   press(2.0, 3.0, 0.4, 0.1);
   hold(ALL);
-  const float ratio = doubt.ratio;
+  const float ratio = bias.ratio;
   TEST_ASSERT_TRUE(ratio > 0.2f);
-  doubt = (struct fit_doubt){0};
+  bias = (struct fit_bias){0};
   fit();
   follow();
   press(-5.0, 8.0, 0.0, 0.0);
   fit();
-  for (int part = 1; part < FIT_DOUBT_PARTS; part++) {
-    TEST_ASSERT_FALSE(doubt.known);
+  for (int part = 1; part < FIT_BIAS_PARTS; part++) {
+    TEST_ASSERT_FALSE(bias.known);
     follow();
   }
-  TEST_ASSERT_TRUE(doubt.known);
-  TEST_ASSERT_EQUAL_FLOAT(ratio, doubt.ratio);
+  TEST_ASSERT_TRUE(bias.known);
+  TEST_ASSERT_EQUAL_FLOAT(ratio, bias.ratio);
 }
 
-/* What is known of the pad's dip is taken out of the residual too. A calibration finds a wider one
- * than there is, since it can not tell a narrow one from zeros (DIP_WIDTHS of the solver). */
+/* The search removes a known dip. Calibrations find too wide a dip, since a narrow one looks like shifted zeros (DIP_WIDTHS, solver). */
 TEST(test_a_dip_that_is_known_is_no_force) {
   static const float known_mm[] = {15.0f, 20.7f};
   rubber.dip_share = 0.05;
@@ -151,18 +150,18 @@ TEST(test_what_is_the_sensors_own_is_no_force) {
   fit_set_errors(&settings, 0.002f, 0.0065f);
   for (int i = 0; i < 200; i++) {
     double x_mm = any(-9.0, 9.0), y_mm = any(-18.0, 18.0);
-    pad_press_draw_own(&rubber, 600, 2000, &noise);
+    pad_press_draw_deviations(&rubber, 600, 2000, &noise);
     for (int k = 0; k < SENSORS; k++) {
-      const struct fit_own *own = &rubber.own[k];
-      double sigma_mm = 6.0 * exp(own->wider_q15 / 32768.0);
-      double dx = 9.0 * (k / 5 - 1 + own->off_x_q15 / 32768.0) - x_mm;
-      double dy = 9.0 * (k % 5 - 2 + own->off_y_q15 / 32768.0) - y_mm;
+      const struct fit_deviation *deviation = &rubber.deviations[k];
+      double sigma_mm = 6.0 * exp(deviation->wider_q15 / 32768.0);
+      double dx = 9.0 * (k / 5 - 1 + deviation->off_x_q15 / 32768.0) - x_mm;
+      double dy = 9.0 * (k % 5 - 2 + deviation->off_y_q15 / 32768.0) - y_mm;
       readings[k] = (int32_t)lround(1024.0 * 2e4 * exp(-(dx * dx + dy * dy) / (2.0 * sigma_mm * sigma_mm)));
     }
     for (int known = 0; known < 2; known++) {
-      settings.own = known ? rubber.own : NULL;
+      settings.deviations = known ? rubber.deviations : NULL;
       hold(ALL);
-      forces[known] += doubt.known && doubt.ratio > 0.1f;
+      forces[known] += bias.known && bias.ratio > 0.1f;
     }
   }
   CHECK(forces[0] >= 20 && forces[1] <= 4, "of 200 forces: %d, known %d", forces[0], forces[1]);
@@ -173,13 +172,13 @@ TEST(test_sensors_may_be_missing) {
   press(2.0, 3.0, 0.4, 0.1);
   for (int k = 0; k < SENSORS; k++) {
     hold(ALL & ~(UINT32_C(1) << k));
-    TEST_ASSERT_TRUE(doubt.known);
+    TEST_ASSERT_TRUE(bias.known);
     TEST_ASSERT_TRUE_MESSAGE(is_uncertain(), "one is enough to hide it");
   }
   press(2.0, 3.0, 0.0, 0.0);
-  hold((UINT32_C(1) << (FIT_DOUBT_SENSORS - 1)) - 1);
-  TEST_ASSERT_FALSE(doubt.known);
-  TEST_ASSERT_TRUE(result.location_sd_mm > FIT_DOUBT_USUAL * 0.38f * 9.0f);
+  hold((UINT32_C(1) << (FIT_BIAS_SENSORS - 1)) - 1);
+  TEST_ASSERT_FALSE(bias.known);
+  TEST_ASSERT_TRUE(result.location_sd_mm > FIT_BIAS_ASSUMED_RATIO * 0.38f * 9.0f);
 }
 
 TEST(test_what_is_no_fit_stays_as_it_is) {
@@ -189,11 +188,11 @@ TEST(test_what_is_no_fit_stays_as_it_is) {
     fit();
     result.flags = flags[i];
     result.location_sd_mm = 0.1f;
-    for (int frame = 0; frame < 2 * FIT_DOUBT_PARTS; frame++) {
+    for (int frame = 0; frame < 2 * FIT_BIAS_PARTS; frame++) {
       widen();
       follow();
     }
-    TEST_ASSERT_FALSE(doubt.known);
+    TEST_ASSERT_FALSE(bias.known);
     TEST_ASSERT_EQUAL_FLOAT(0.1f, result.location_sd_mm);
     TEST_ASSERT_EQUAL_HEX32(flags[i], result.flags);
   }

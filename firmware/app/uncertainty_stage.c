@@ -1,4 +1,4 @@
-#include "app/doubt_stage.h"
+#include "app/uncertainty_stage.h"
 
 #include "common/contact_flags.h"
 #include "config/defaults.h"
@@ -9,14 +9,14 @@
 
 static bool is_estimated(const struct findings *found) { return found->tangential && found->tangential->valid; }
 
-void doubt_stage_process(const struct doubt_stage *own, const struct location_stage *location, struct findings *found) {
+void uncertainty_stage_process(const struct uncertainty_stage *own, const struct location_stage *location, struct findings *found) {
   if (found->conditioned.contact && !is_estimated(found)) {
-    fit_doubt_widen(&own->force, &location->array, &location->settings, &found->fit);
+    fit_bias_widen(&own->force, &location->array, &location->settings, &found->fit);
     found->contact.flags |= found->fit.flags & CONTACT_FLAG_UNCERTAIN;
   }
 }
 
-static void learn_gains(struct doubt_stage *own, struct location_stage *location, const struct findings *found) {
+static void learn_gains(struct uncertainty_stage *own, struct location_stage *location, const struct findings *found) {
   if (fit_gains_learn(&own->gains, &location->array, found->conditioned.pressure_Pa_q10, &location->settings, &found->fit)) {
     const float gain_sd = fit_gains_sd(&own->gains);
     for (unsigned k = 0; k < geometry.sensor_count; k++) {
@@ -25,29 +25,29 @@ static void learn_gains(struct doubt_stage *own, struct location_stage *location
   }
 }
 
-static void do_part(struct doubt_stage *own, struct location_stage *location, const struct findings *found) {
+static void do_part(struct uncertainty_stage *own, struct location_stage *location, const struct findings *found) {
   if (own->gains_are_due) {
     learn_gains(own, location, found);
     own->gains_are_due = false;
     return;
   }
-  fit_doubt_follow(&own->force, &location->array, found->conditioned.pressure_Pa_q10, &location->settings, &found->fit);
+  fit_bias_step(&own->force, &location->array, found->conditioned.pressure_Pa_q10, &location->settings, &found->fit);
   own->gains_are_due = own->force.part == 0 && !location->calibration;
 }
 
-void doubt_stage_follow(struct doubt_stage *own, struct location_stage *location, const struct findings *found) {
+void uncertainty_stage_follow(struct uncertainty_stage *own, struct location_stage *location, const struct findings *found) {
   const uint32_t t_us = (uint32_t)found->frame.t_us;
   const bool slow = t_us - own->frame_us >= ALL_AT_ONCE_us;
   own->frame_us = t_us;
   if (!found->conditioned.contact || is_estimated(found)) {
-    fit_doubt_begin(&own->force);
-    fit_gains_lift(&own->gains);
+    fit_bias_begin(&own->force);
+    fit_gains_end_touch(&own->gains);
     own->gains_are_due = false;
     return;
   }
-  for (int parts = slow ? FIT_DOUBT_PARTS + 1 : 1; parts > 0; parts--) {
+  for (int parts = slow ? FIT_BIAS_PARTS + 1 : 1; parts > 0; parts--) {
     do_part(own, location, found);
   }
 }
 
-void doubt_stage_forget_gains(struct doubt_stage *own) { fit_gains_begin(&own->gains, DEFAULT_GAIN_SD); }
+void uncertainty_stage_forget_gains(struct uncertainty_stage *own) { fit_gains_begin(&own->gains, DEFAULT_GAIN_SD); }
