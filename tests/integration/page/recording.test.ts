@@ -130,7 +130,7 @@ test('a replay of two: one that was closed stays away; one that restarted has lo
   const writer = new core.Writer('csv', packets[0] as Info, []);
   for (let i = 0; i < 10; i++) {
     writer.packet({ ...packets[i]!, sequence: i < 5 ? 40_000 + i : i });
-    writer.event(i === 4 ? 'back' : 'request');
+    writer.event(['gone', 'back'][i - 4] ?? 'request'); // one that is back identifies itself first
   }
   writer.finish('stopped', decoder.counts);
   const receive = (bytes: Uint8Array): void => decoder.feed(bytes, closed);
@@ -151,6 +151,9 @@ test('torn and foreign files: a sentence, and what came before', async () => {
     ['later.csv', text(['# fingertip-recording 3', ...lines.slice(1)]), /format "3" is unknown.*use the page of that version/, false],
     ['torn.mcap', mcap.subarray(0, (2 * mcap.length) / 3), /the last chunk is torn/, false], // of two: the head's, and that of all rows
     ['noise.ftr', Buffer.alloc(500), /holds no packet/, false],
+    ['noise.mcap', Buffer.alloc(500, 'noise'), /choose another/, false],
+    ['letter.txt', Buffer.from('Dear reader,\n'), /recording.*choose another/, false],
+    ['empty.csv', Buffer.alloc(0), /choose another/, false],
     ['damaged.ftr', damaged, /has 1 damaged packets, which are left out/, true],
   ] as const) {
     const before: DevicePacket[] = [];

@@ -37,8 +37,8 @@ export interface Item {
    * without a time. */
   time_us: number;
   packet: DevicePacket;
-  /** Its port had vanished before: its numbers begin again. */
-  is_back: boolean;
+  /** Its port vanished before it: the fingertip's numbers begin again. */
+  is_restarted: boolean;
 }
 
 /** What to do about an error, by enum fingertip_status. */
@@ -54,7 +54,7 @@ const AT_ONCE_bytes = 1 << 18;
 /** All that is in a file: a recording (.csv, .mcap), or bytes of a line (.ftr). Throws ReadError. */
 export async function* readItems(file: File): AsyncGenerator<Item, void, undefined> {
   const reader = new Reader(file.name, file.size);
-  const back = new Set<number>();
+  const gone = new Set<number>();
   let packets = 0;
   try {
     for (;;) {
@@ -67,9 +67,9 @@ export async function* readItems(file: File): AsyncGenerator<Item, void, undefin
         reader.feed(new Uint8Array(await file.slice(from, from + AT_ONCE_bytes).arrayBuffer()));
       } else if (item.packet) {
         packets++;
-        yield { device: item.device, time_us: item.time_us, packet: item.packet, is_back: back.delete(item.device) };
-      } else if (item.event.startsWith('back')) {
-        back.add(item.device);
+        yield { device: item.device, time_us: item.time_us, packet: item.packet, is_restarted: gone.delete(item.device) };
+      } else if (item.event.startsWith('gone')) {
+        gone.add(item.device);
       }
     }
     const problem = problemOf(reader, packets);
@@ -137,12 +137,12 @@ class ReplayLine implements Line {
     return Promise.resolve();
   }
 
-  take({ packet, is_back }: Item): void {
+  take({ packet, is_restarted }: Item): void {
     if (packet.type === PacketType.INFO) {
       this.serial = packet.serial;
     }
     // Where they begin again they go on here: nothing was lost.
-    this.ahead = is_back ? this.sequence - packet.sequence : this.ahead;
+    this.ahead = is_restarted ? this.sequence - packet.sequence : this.ahead;
     const sequence = (packet.sequence + this.ahead) & 0xffff;
     this.sequence = sequence + 1;
     this.receive?.(encode({ ...packet, sequence }), performance.now());
