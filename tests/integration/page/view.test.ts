@@ -230,7 +230,8 @@ test('readers of the screen are told what begins, ends and changes, no faster th
   const slips = { ...pressed, force_N: 8, flags: FITTED | Flag.SLIP | Flag.ELONGATED };
   assert.match(speech.sentence(slips, 'live', 80_000) ?? '', /^Slips; .*round/);
   assert.equal(speech.sentence(slips, 'live', 90_000), null);
-  assert.equal(speech.sentence(contactOf({ flags: Flag.TARED }), 'live', 100_000), 'No contact.');
+  assert.equal(speech.sentence(null, 'stalled', 95_000), 'Stalled.', 'whether it is touched is not known');
+  assert.equal(speech.sentence(contactOf({ flags: Flag.TARED }), 'live', 100_000), 'Live; no contact.');
 });
 
 test('of plain notices three stay, and every fault, once', () => {
@@ -282,12 +283,17 @@ test('a moment of the past is the contact of then, its trail that of the second 
     qx_N: 1,
     flags: i < 1400 || (i >= 1450 && i < 1500) ? Flag.TARED : FITTED,
   }));
-  const { contact, trail } = momentAt(history, 2);
+  const { contact, trail } = momentAt(history, 2, 0.7);
   assert.ok(Math.abs(contact!.force_N - 2) < 1e-5);
   assert.equal(contact!.qx_N, 0, 'without its flag');
   assert.ok(trail.length > 5);
   trail.forEach(({ x_mm }, i) => assert.ok(x_mm >= 15 && x_mm <= 20.001 && (i === 0 || x_mm > (trail[i - 1]?.x_mm ?? 0))));
   const ring = historyOf(5000, (i) => ({ force_N: i }), 1000);
-  const forces_N = [1, 3.5, 4.5, Infinity].map((t_s) => momentAt(ring, t_s).contact?.force_N);
+  const forces_N = [1, 3.5, 4.5, Infinity].map((t_s) => momentAt(ring, t_s, 0.7).contact?.force_N);
   assert.deepEqual(forces_N, [undefined, 4000, 4500, 4999]);
+  const parted = historyOf(3000, (i) => (i < 1000 || i >= 2000 ? {} : null));
+  assert.deepEqual(
+    [0.999, 1.1, 1.4].map((t_s) => momentAt(parted, t_s, 0.7).contact !== null),
+    [true, false, true],
+  );
 });

@@ -28,11 +28,11 @@ export class HandPanel implements Touch {
     this.pressButton = button('Press', () => this.toggle('press'), { 'aria-pressed': 'false' });
     this.holdButton = button('Hold in a grip', () => this.toggle('hold'), { 'aria-pressed': 'false' });
     const drop = button('Drop it', () => {
-      this.end();
+      this.set('nothing');
       hand.drop?.(this.x.value, this.y.value);
     });
     const lift = button('Lift', () => {
-      this.end();
+      this.set('nothing');
       hand.lift();
     });
     this.element = element(
@@ -59,9 +59,7 @@ export class HandPanel implements Touch {
   }
 
   down(x_mm: number, y_mm: number): void {
-    this.end();
-    this.doing = 'pointer';
-    this.since_ms = performance.now();
+    this.set('pointer');
     this.move(x_mm, y_mm);
   }
 
@@ -72,8 +70,7 @@ export class HandPanel implements Touch {
 
   up(): void {
     if (this.doing === 'pointer') {
-      this.doing = 'nothing';
-      this.sent = '';
+      this.set('nothing');
       this.hand.lift();
     }
   }
@@ -113,7 +110,7 @@ export class HandPanel implements Touch {
     }
     const object = element('select', { id: 'object' }, ...hand.objects.map(({ name, title }) => element('option', { value: name }, title)));
     object.addEventListener('change', () => {
-      this.end();
+      this.set('nothing');
       hand.choose?.(object.value);
     });
     return [element('div', { class: 'field' }, element('label', { for: 'object' }, 'Object'), object)];
@@ -136,24 +133,18 @@ export class HandPanel implements Touch {
 
   private toggle(doing: 'press' | 'hold'): void {
     const off = this.doing === doing;
-    this.end();
+    this.set(off ? 'nothing' : doing);
     if (off) {
       this.hand.lift();
     } else {
-      this.doing = doing;
-      this.since_ms = performance.now();
       this.apply(this.since_ms);
     }
-    this.showState();
   }
 
-  private end(): void {
-    this.doing = 'nothing';
+  private set(doing: Doing): void {
+    this.doing = doing;
+    this.since_ms = performance.now();
     this.sent = '';
-    this.showState();
-  }
-
-  private showState(): void {
     this.pressButton.setAttribute('aria-pressed', String(this.doing === 'press'));
     this.holdButton.setAttribute('aria-pressed', String(this.doing === 'hold'));
   }

@@ -2,7 +2,6 @@
 import { Flag, Stored } from '../line/line_facts';
 import { capabilitiesText, storedText } from '../core';
 import { hasSensor } from '../model/history';
-import { momentAt } from './recorded_contact';
 import type { Level, Shown } from './shown';
 
 export interface Fact {
@@ -36,7 +35,7 @@ export function factsOf(shown: Shown, now_ms: number): FactGroup[] {
   const current = shown.isCurrent(now_ms);
   return [
     { title: 'Line', facts: lineFacts(shown, current) },
-    ...(info ? [{ title: 'Sensors', facts: sensorFacts(shown, info.sensor_count, current) }] : []),
+    ...(info ? [{ title: 'Sensors', facts: sensorFacts(shown, info.sensor_count, now_ms) }] : []),
     ...(health
       ? [
           {
@@ -66,18 +65,18 @@ function lineFacts({ fingertip, frames_per_s }: Shown, current: boolean): Fact[]
   ];
 }
 
-function sensorFacts({ fingertip }: Shown, count: number, current: boolean): Fact[] {
-  const { health, history, raw, raws } = fingertip;
+function sensorFacts(shown: Shown, count: number, now_ms: number): Fact[] {
+  const { state, health, raw } = shown.fingertip;
   const facts: Fact[] = [];
-  if (health && current) {
+  if (health && state === 'live') {
     const answering = sensorsOf(health.sensors_present, count).length;
     facts.push(fact('answer', `${answering} of ${count}`, answering < count ? 'bad' : 'good'));
   }
-  if (history && raws > 0 && current) {
-    const { readings } = momentAt(history, Infinity);
-    const doubtful = sensorsOf(readings?.doubtful ?? 0, count).join(', ');
+  const { readings } = shown.moment(Infinity, now_ms);
+  if (readings) {
+    const doubtful = sensorsOf(readings.doubtful, count).join(', ');
     facts.push(fact('in doubt', doubtful || 'none', doubtful ? 'warning' : 'plain'));
-    if (readings && readings.valid !== 2 ** count - 1) {
+    if (readings.valid !== 2 ** count - 1) {
       facts.push(fact('without reading', sensorsOf(2 ** count - 1 - readings.valid, count).join(', '), 'bad'));
     }
     facts.push(fact('temperature', raw.temperature_cC ? `${(raw.temperature_cC / 100).toFixed(1)} °C` : '–'));

@@ -18,6 +18,7 @@ interface Number_ {
   readonly seldom?: boolean;
 }
 
+export const forceText = (contact: ShownContact) => `${contact.flags & Flag.FORCE_LOWER_BOUND ? '≥ ' : ''}${fixed(contact.force_N, 2)}`;
 const sdOf = (of: (contact: ShownContact) => number, digits: number) => (contact: ShownContact) =>
   contact.flags & Flag.UNCERTAINTY_VALID ? `± ${fixed(of(contact), digits)}` : '';
 
@@ -27,7 +28,7 @@ const NUMBERS: readonly Number_[] = [
     title: 'Force',
     unit: 'N',
     valid: Flag.FIT_VALID,
-    value: (contact) => `${contact.flags & Flag.FORCE_LOWER_BOUND ? '≥ ' : ''}${fixed(contact.force_N, 2)}`,
+    value: forceText,
     sd: sdOf((contact) => contact.force_sd_N, 2),
     truth: (truth) => fixed(truth.force_N, 2),
   },

@@ -3,8 +3,7 @@ import { Flag } from '../line/line_facts';
 import { WARNING_FLAGS } from '../model/flags';
 import { button, element, write } from './elements';
 import { HandPanel } from './hand_panel';
-import { NOTHING_KNOWN, momentAt } from './recorded_contact';
-import { fixed } from './numbers';
+import { forceText } from './numbers';
 import { sceneOf } from './pad_scene';
 import { PadView } from './pad_view';
 import type { Palette } from './palette';
@@ -66,12 +65,11 @@ export class PadCard {
     if (!history) {
       return false;
     }
-    const current = behind_s !== null || shown.isCurrent(performance.now());
-    const seen = `${history.end} ${behind_s} ${current} ${truth?.contact} ${truth?.x_mm} ${truth?.y_mm} ${!found}`;
+    const seen = `${history.end} ${behind_s} ${shown.isCurrent(performance.now())} ${truth?.contact} ${truth?.x_mm} ${truth?.y_mm} ${!found}`;
     if (seen !== this.seen && info && this.view) {
       this.seen = seen;
       const live = behind_s === null;
-      const { contact, readings, trail } = current ? momentAt(history, live ? Infinity : end_s - behind_s) : NOTHING_KNOWN;
+      const { contact, readings, trail } = shown.moment(live ? Infinity : end_s - behind_s, performance.now());
       this.contact = contact;
       const place = live && truth?.contact ? { x_mm: truth.x_mm, y_mm: truth.y_mm } : null;
       const scene = sceneOf(info, contact, readings, trail, place, found);
@@ -92,8 +90,7 @@ export class PadCard {
     this.state.className = `state ${level}`;
     const fitted = contact !== null && (contact.flags & Flag.FIT_VALID) !== 0;
     const doubt = fitted && contact.flags & WARNING_FLAGS ? ' ?' : '';
-    write(this.force, fitted ? `${fixed(contact.force_N, 2)} N${doubt}` : '');
-    this.force.classList.toggle('doubtful', doubt !== '');
+    write(this.force, fitted ? `${forceText(contact)} N${doubt}` : '');
   }
 
   private prepare(): void {

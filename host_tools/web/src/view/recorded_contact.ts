@@ -6,22 +6,20 @@ import type { Place } from './pad_scene';
 import type { ShownContact } from './shown';
 
 /** What is known of it. */
-interface Moment {
+export interface Moment {
   contact: ShownContact | null;
   readings: Readings | null;
   trail: readonly Place[];
 }
 
 export const NOTHING_KNOWN: Moment = { contact: null, readings: null, trail: [] };
-/** A moment this much before the oldest row is that row's: the time bar has whole steps. */
-const BEFORE_s = 1;
 const TRAIL_s = 1;
 const TRAIL_POINTS = 24;
 
-/** Infinity: the newest. Nothing of a moment that is not kept any more. */
-export function momentAt(history: History, t_s: number): Moment {
+/** Infinity: the newest. Nothing where no frame came for longer than longest_s, or is kept. */
+export function momentAt(history: History, t_s: number, longest_s: number): Moment {
   const row = Math.min(history.rowAt(t_s), history.end - 1);
-  if (row < history.begin || (row === history.begin && history.t_s[history.slot(row)] > t_s + BEFORE_s)) {
+  if (row < history.begin || history.t_s[history.slot(row)] > t_s + longest_s) {
     return NOTHING_KNOWN;
   }
   // A contact packet comes before the raw packet of its frame.

@@ -3,6 +3,7 @@
 import { Flag, Stored, type Contact, type ContactField, type Info } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
 import { FINGERS } from './palette';
+import { NOTHING_KNOWN, momentAt, type Moment } from './recorded_contact';
 
 /** The newest contact, or that of a moment in the past. A value whose flag is off is 0. */
 export type ShownContact = Pick<Contact, 'flags' | ContactField>;
@@ -107,6 +108,12 @@ export class Shown {
     return reported && (is_replay || (state === 'live' && now_ms - framed_ms < this.stalled_ms));
   }
 
+  /** What is known of a moment of its history; of now, Infinity, nothing once the newest frame is old. */
+  moment(t_s: number, now_ms: number): Moment {
+    const { history } = this.fingertip;
+    return history && (t_s < Infinity || this.isCurrent(now_ms)) ? momentAt(history, t_s, this.stalled_ms / 1000) : NOTHING_KNOWN;
+  }
+
   /** Two frames at a rate that somebody has set. */
   private get stalled_ms(): number {
     const { info } = this.fingertip;
@@ -125,7 +132,7 @@ export class Shown {
     if (state === 'opening') {
       return { words: 'waiting for an answer', level: 'warning' };
     }
-    if (health && health.sensors_present === 0) {
+    if (state === 'live' && health?.sensors_present === 0) {
       return { words: 'no sensor answers', level: 'bad' };
     }
     const silent_ms = now_ms - framed_ms;

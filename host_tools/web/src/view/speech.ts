@@ -20,20 +20,23 @@ export class Speech {
   private spoken: Spoken = { contact: false, slips: false, warnings: 0, force_N: 0, state: '' };
   private at_ms = -Infinity;
 
-  /** A sentence, or null where there is nothing new or it would be too soon. state: "live". */
+  /** A sentence, or null where there is nothing new or it would be too soon. contact: null where nothing is known. state: "live". */
   sentence(contact: ShownContact | null, state: string, now_ms: number): string | null {
     if (now_ms - this.at_ms < PACE_ms) {
       return null;
     }
     const flags = contact?.flags ?? 0;
+    const was = this.spoken;
     const is: Spoken = {
-      contact: (flags & Flag.CONTACT) !== 0,
-      slips: (flags & (Flag.SLIP | Flag.SLIDING)) !== 0,
-      warnings: flags & WARNING_FLAGS,
-      force_N: flags & Flag.FIT_VALID ? (contact?.force_N ?? 0) : 0,
+      ...was,
+      ...(contact && {
+        contact: (flags & Flag.CONTACT) !== 0,
+        slips: (flags & (Flag.SLIP | Flag.SLIDING)) !== 0,
+        warnings: flags & WARNING_FLAGS,
+        force_N: flags & Flag.FIT_VALID ? contact.force_N : 0,
+      }),
       state,
     };
-    const was = this.spoken;
     const parts: string[] = [];
     if (is.state !== was.state) {
       parts.push(is.state);

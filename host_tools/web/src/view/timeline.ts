@@ -60,10 +60,10 @@ export class Timeline {
 
   /** How much is kept, so how far back one can go. */
   set length_s(length_s: number) {
-    const kept_s = Math.max(1, Math.ceil(length_s)); // whole steps
+    const kept_s = STEP_s * Math.max(1, Math.ceil(length_s / STEP_s));
     if (kept_s !== this.kept_s) {
       this.kept_s = kept_s;
-      this.slider.min = String(-kept_s);
+      this.slider.min = (-kept_s).toFixed(1);
     }
   }
 

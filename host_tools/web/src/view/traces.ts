@@ -305,7 +305,7 @@ export class Traces {
       { name: 'contact', bit: Flag.CONTACT as number | 'lost', colour: 'accent', always: true },
       { name: 'slip', bit: Flag.SLIP, colour: 'bad', always: true },
       { name: 'sliding', bit: Flag.SLIDING, colour: 'bad', always: false },
-      { name: 'moving', bit: Flag.MOVING, colour: 'good', always: false },
+      { name: 'moving', bit: Flag.MOVING, colour: 'warning', always: false },
       ...FLAGS.filter(({ warning }) => warning).map(({ bit, meaning }) => ({ name: meaning, bit, colour: 'warning', always: false })),
       { name: 'lost frames', bit: 'lost' as const, colour: 'bad', always: false },
     ]
