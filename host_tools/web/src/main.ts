@@ -29,8 +29,8 @@ function start(): void {
   });
   app.notice = (text, kind) => view.notice(text, kind);
   keepFocus();
-  // A recording that is not ended is lost with the page.
-  addEventListener('beforeunload', (event) => app.recorders.size > 0 && event.preventDefault());
+  // A recording that is not saved is lost with the page.
+  addEventListener('beforeunload', (event) => app.unsaved.size > 0 && event.preventDefault());
   globalThis.fingertip = {
     fingertips: app.fingertips,
     get pictures() {
@@ -49,7 +49,7 @@ if (problem === null) {
   start();
 } else {
   const text =
-    `This page cannot start: wasm/core.wasm cannot be used (${problem}). Reload the page. If that does not help, ` +
+    `This page cannot start (${problem}). If loading it again does not help, ` +
     'start it with "fingertip web", or copy all of its files to the server again.';
   document.body.replaceChildren(element('p', { class: 'notice bad', role: 'alert' }, text));
 }

@@ -18,9 +18,9 @@ export class FirmwareLeft extends Error {
  * @param {string} url
  */
 export async function fetched(url) {
-  const response = await fetch(url);
-  if (!response.ok) {
-    throw new WasmError(`${url}: the server answers ${response.status}`);
+  const response = await fetch(url).catch(() => null);
+  if (!response?.ok) {
+    throw new WasmError(`${url}: the server answers ${response?.status ?? 'nothing'}; load the page again`);
   }
   return response.arrayBuffer();
 }

@@ -1,5 +1,6 @@
 /** A fingertip's model over a line that the test speaks on: answers, refusals, losses, going and coming back; history; what is done with it. */
 import assert from 'node:assert/strict';
+import { readFileSync } from 'node:fs';
 import test from 'node:test';
 import type { Line } from '../../../host_tools/web/src/line/line';
 import { SerialLine } from '../../../host_tools/web/src/line/serial_line';
@@ -14,6 +15,7 @@ import { commandsFor, set } from '../../../host_tools/web/src/steps/settings';
 import { tare } from '../../../host_tools/web/src/steps/tare';
 import { factsOf } from '../../../host_tools/web/src/view/health_facts';
 import { Shown } from '../../../host_tools/web/src/view/shown';
+import { load as loadJudges } from '../../../host_tools/web/wasm/judges.mjs';
 import { core, decoded, vector } from './library';
 
 function contactOf(frame: number, t_us: number, more: Partial<Contact> = {}): Contact {
@@ -56,37 +58,34 @@ class SpokenLine implements Line {
 
   constructor(private readonly serial = '') {}
 
-  open(receive: SpokenLine['receive'], closed: SpokenLine['closed']): Promise<void> {
+  async open(receive: SpokenLine['receive'], closed: SpokenLine['closed']): Promise<void> {
     this.receive = receive;
     this.closed = closed;
     receive(Uint8Array.of(7, 7, 0), performance.now()); // the end of a frame that was under way
-    return Promise.resolve();
   }
 
-  close(): Promise<void> {
-    return Promise.resolve();
-  }
+  async close(): Promise<void> {}
 
   say(packet: object & { type: number }): void {
     this.device_us += 100;
     this.receive(core.encode({ t_us: this.device_us, ...packet, sequence: this.sequence++ & 0xffff }), performance.now());
   }
 
-  send(frame: Uint8Array): Promise<void> {
+  async send(frame: Uint8Array): Promise<void> {
     if (this.version !== WIRE_VERSION) {
       const known = core.infoFrameOfVersion(this.version);
       if (Buffer.compare(frame, known) === 0) {
         this.receive(known, performance.now()); // an empty packet will do: the version is judged first
       }
-      return Promise.resolve();
+      return;
     }
     const command = decoded(frame) as Asked | null;
     if (!command) {
-      return Promise.resolve();
+      return;
     }
     this.commands.push(command.type);
     if (this.silent) {
-      return Promise.resolve();
+      return;
     }
     this.streams = command.streams ?? this.streams;
     if (--this.hears > 0) {
@@ -94,11 +93,10 @@ class SpokenLine implements Line {
         queueMicrotask(() => this.acknowledge(command, Result.NOT_NOW));
       }
       this.first ??= () => this.answer(command);
-      return Promise.resolve();
+      return;
     }
     queueMicrotask(this.first ?? (() => this.answer(command)));
     this.first = null;
-    return Promise.resolve();
   }
 
   private first: (() => void) | null = null;
@@ -180,30 +178,28 @@ test('refusals and questions: what a command is answered', async () => {
   await assert.rejects(fingertip.tare(), /not connected/);
 });
 
-test('an answer to the first try is one, however late; a packet that was lost is asked for again', async () => {
+test('an answer to the first try is one, however late; a packet that was lost is asked for again', async (t) => {
   const [fingertip, line] = await opened();
   const usual = { ...PATIENCE };
-  try {
-    Object.assign(PATIENCE, { tries: 3, answer_ms: 1 });
-    line.hears = 3;
-    await fingertip.tare();
-    line.hears = 3;
-    line.refuses_repeats = true;
-    await fingertip.tare();
-    line.loses = 2;
-    assert.equal((await fingertip.askHealth()).type, PacketType.HEALTH);
-    assert.ok(line.loses < 0);
-    Object.assign(PATIENCE, { tries: 2 });
-    line.loses = 1e6;
-    await assert.rejects(fingertip.askHealth(), /no answer came; try again/);
-  } finally {
-    Object.assign(PATIENCE, usual);
-  }
+  t.after(() => Object.assign(PATIENCE, usual));
+  Object.assign(PATIENCE, { tries: 3, answer_ms: 1 });
+  line.hears = 3;
+  await fingertip.tare();
+  line.hears = 3;
+  line.refuses_repeats = true;
+  await fingertip.tare();
+  line.loses = 2;
+  assert.equal((await fingertip.askHealth()).type, PacketType.HEALTH);
+  assert.ok(line.loses < 0);
+  Object.assign(PATIENCE, { tries: 2 });
+  line.loses = 1e6;
+  await assert.rejects(fingertip.askHealth(), /no answer came; try again/);
 });
 
 test('the cable is pulled amid a command: it fails at once, with words; another line has it back', async () => {
   const [fingertip, line] = await opened();
-  line.say(contactOf(7, 9_000_000));
+  const framed_ms = performance.now() / 2;
+  line.receive(core.encode({ ...contactOf(7, 9_000_000), sequence: line.sequence++ }), framed_ms);
   let text = '';
   const output = { name: '', failure: '', write: (bytes: Uint8Array) => void (text += Buffer.from(bytes)), finish: async () => {} };
   const recorder = new Recorder(fingertip, 'csv', output, '0', assert.fail);
@@ -225,7 +221,7 @@ test('the cable is pulled amid a command: it fails at once, with words; another 
   back.say(rawOf(1, 1_000, [0, 0]));
   const { history } = fingertip;
   assert.equal(history?.end, 2);
-  assert.ok(history.t_s[1]! > history.t_s[0]!);
+  assert.ok(history.t_s[1]! >= history.t_s[0]! + framed_ms / 1000, 'not since another was heard');
   assert.equal(fingertip.lost, 0);
   await recorder.finish();
   assert.match(text, /# event: gone .*\n# event: back .*\n# packet: info /);
@@ -247,12 +243,21 @@ test('closed amid a step of its opening: it stays closed, its line too', async (
   await assert.rejects(new Fingertip(brief).open(), /unplugged/);
 });
 
-test('two clicks on "Disconnect" take one off the page; a tare ends with its fingertip', async () => {
+test('two clicks on "Disconnect" take one off the page, once its recording is whole; a tare ends with its fingertip', async () => {
   const app = new App();
   const [[first], [second, line]] = [await opened(), await opened()];
   app.fingertips.push(first, second);
-  await Promise.all([app.disconnect(first), app.disconnect(first)]);
-  assert.deepEqual(app.fingertips, [second]);
+  let whole = (): void => undefined;
+  const stream = { write: async () => {}, close: () => new Promise<void>((done) => (whole = done)) };
+  const showSaveFilePicker = async () => ({ name: 'a.csv', createWritable: async () => stream });
+  Object.assign(globalThis, { window: { showSaveFilePicker } });
+  await app.record(first, 'csv');
+  const left = Promise.all([app.disconnect(first), app.disconnect(first)]);
+  await new Promise(setImmediate);
+  assert.deepEqual([app.recorders.size, app.unsaved.size], [0, 1]);
+  whole();
+  await left;
+  assert.deepEqual([app.fingertips, app.unsaved.size], [[second], 0]);
   let said = '';
   app.notice = (text) => (said = text);
   line.ends_after = PacketType.CMD_TARE;
@@ -260,7 +265,7 @@ test('two clicks on "Disconnect" take one off the page; a tare ends with its fin
   assert.match(said, /not tared: unplugged/);
 });
 
-test('a simulated fingertip that cannot be opened keeps out none of the others; a port that is none leaves the choice', async (t) => {
+test('a simulated fingertip that cannot be opened keeps out none of the others; a port that is none leaves the choice, one of other USB ids is left alone', async (t) => {
   let looks = 0;
   Object.assign(globalThis, { document: { baseURI: 'http://here/' } });
   t.mock.method(globalThis, 'setTimeout', (then: () => void) => void setImmediate(then));
@@ -271,7 +276,8 @@ test('a simulated fingertip that cannot be opened keeps out none of the others; 
   let asked = 0;
   const open = () => Promise.reject(new DOMException('', 'NetworkError'));
   const port = { getInfo: () => ({ usbVendorId: 0x1209, usbProductId: 1 }), open, close: open };
-  const serial = { getPorts: async () => [port], requestPort: async () => (asked++, port) };
+  const other = { ...port, getInfo: () => ({ usbVendorId: 0x10c4, usbProductId: 0xea60 }), open: () => (asked++, open()) };
+  const serial = { getPorts: async () => [other, port], requestPort: async () => (asked++, port) };
   Object.defineProperty(globalThis, 'navigator', { value: {}, configurable: true, writable: true });
   const app = new App();
   app.start();
@@ -317,9 +323,26 @@ test('what is shown as present is of a frame that has just come, by the rate tha
   at(1e6 + 900, vector('health'));
   const { frames, latency, temperature, answer } = facts(1e6 + 1000);
   assert.deepEqual([shown.isCurrent(1e6 + 1000), shown.state(1e6 + 1000).words], [false, 'stalled for 1 s']);
-  assert.deepEqual([frames, latency, temperature, answer], ['0 /s', undefined, undefined, undefined]);
+  assert.deepEqual([frames, latency, temperature, answer], ['0 /s', undefined, undefined, '0 of 2']);
   fingertip.info!.rate_mHz = 1000;
   assert.deepEqual([shown.isCurrent(1e6 + 1000), shown.state(1e6 + 1000).words], [true, 'live']);
+  const isKnown = (t_s: number, now_ms: number) => shown.moment(t_s, now_ms).contact !== null;
+  assert.deepEqual([isKnown(Infinity, 1e6 + 1000), isKnown(Infinity, 1e6 + 5000), isKnown(1000, 1e6 + 5000)], [true, false, true]);
+  fingertip.health!.sensors_present = 0;
+  const words = (['live', 'silent'] as const).map((state) => Object.assign(fingertip, { state }) && shown.state(1e6 + 5000).words);
+  assert.deepEqual(words, ['no sensor answers', 'stalled for 5 s']);
+});
+
+test('the doctor judges what was asked and measured, and what the line counted', async () => {
+  const judges = await loadJudges(readFileSync(process.env['FINGERTIP_CORE']!.replace('core.wasm', 'judges.wasm')));
+  const examination = judges.examination({ port: 'a port', tool_version: [7, 6, 5] });
+  for (const [what, name] of Object.entries({ info: 'info_grasp', before: 'health', crash: 'crash', take: 'raw', after: 'health' })) {
+    examination.give(what as 'info', core.frameOf(vector(name)));
+  }
+  examination.line({ bytes: 9000, packets: 200, dropped_packets: 3, out_of_order: 4, crc_errors: 5, format_errors: 6 });
+  const text = JSON.stringify(examination.findings());
+  assert.match(text, /"a port".*this tool is of version 7\.6\.5.*the watchdog struck.*200 packets, 3 lost, 11 damaged/);
+  examination.free();
 });
 
 test('another version of the protocol, and what is no fingertip, are told apart', async () => {
@@ -331,6 +354,7 @@ test('another version of the protocol, and what is no fingertip, are told apart'
   const mute = Object.assign(new SpokenLine(), { silent: true });
   await assert.rejects(new Fingertip(mute).open(), /is no fingertip/);
   mute.open = () => Promise.resolve();
+  mute.send = () => new Promise(() => undefined);
   await assert.rejects(new Fingertip(mute).open(), /nothing answers on this port/);
 });
 
@@ -384,7 +408,7 @@ test('settings: commands for what differs; what it has is asked for after a refu
     { type: PacketType.CMD_PRIOR, sigma_mm: 3.1, width_mm: 0.5 },
     { type: PacketType.CMD_LOCATION_LIMIT, limit_mm: 0.5 },
   ]);
-  assert.throws(() => commandsFor(info, { rate: '20:30' }), /too much/);
+  assert.throws(() => commandsFor(info, { rate: '20:30' }), /too many values/);
   const [fingertip, line] = await opened();
   line.result = Result.OUT_OF_RANGE;
   await assert.rejects(set(fingertip, commandsFor(info, { osr: '256' })), /range/);

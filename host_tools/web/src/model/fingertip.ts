@@ -162,8 +162,8 @@ export class Fingertip {
     this.contacts = this.raws = 0;
     this.health = null;
     this.decoder.restart();
-    if (this.history && this.heard_ms > 0) {
-      this.history.gap_s = (performance.now() - this.heard_ms) / 1000;
+    if (this.history && this.framed_ms > 0) {
+      this.history.gap_s = (performance.now() - this.framed_ms) / 1000;
     }
     this.changed();
     const checkOpen = (): void => {
@@ -314,7 +314,7 @@ export class Fingertip {
   private async otherVersion(): Promise<number> {
     for (let version = OLDEST_VERSION; version < WIRE_VERSION + 3; version++) {
       if (version !== WIRE_VERSION) {
-        await this.line.send(core.infoFrameOfVersion(version));
+        this.line.send(core.infoFrameOfVersion(version)).catch(() => undefined); // a port that hangs never ends it
       }
     }
     const until_ms = performance.now() + PATIENCE.version_ms;

@@ -48,10 +48,7 @@ class DownloadOutput implements Output {
   private readonly parts: Uint8Array<ArrayBuffer>[] = [];
   private length = 0;
 
-  constructor(
-    readonly name: string,
-    private readonly media_type: string,
-  ) {}
+  constructor(readonly name: string) {}
 
   write(bytes: Uint8Array<ArrayBuffer>): void {
     if (this.length + bytes.length > KEPT_MOST_bytes) {
@@ -63,7 +60,7 @@ class DownloadOutput implements Output {
   }
 
   finish(): Promise<void> {
-    download(new Blob(this.parts, { type: this.media_type }), this.name);
+    download(new Blob(this.parts), this.name);
     return this.failure ? Promise.reject(new Error(this.failure)) : Promise.resolve();
   }
 }
@@ -92,9 +89,9 @@ export async function chooseFile(name: string, instead: string): Promise<{ name:
 }
 
 /** A file of the user's choice, if the browser lets a page write files. null: nothing was chosen. */
-export async function chooseOutput(name: string, media_type: string): Promise<Output | null> {
+export async function chooseOutput(name: string): Promise<Output | null> {
   if (!('showSaveFilePicker' in window)) {
-    return new DownloadOutput(name, media_type);
+    return new DownloadOutput(name);
   }
   const file = await chooseFile(name, 'choose another folder');
   return file && new FileOutput(file.name, file.stream);

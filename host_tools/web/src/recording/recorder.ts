@@ -8,11 +8,6 @@ export { chooseOutput } from './output';
 
 export type RecordingKind = 'csv' | 'mcap';
 
-export const MEDIA_TYPES: Record<RecordingKind, string> = {
-  csv: 'text/csv',
-  mcap: 'application/octet-stream',
-};
-
 /** Packets between two writes: some 70 kB. */
 const PART_packets = 256;
 
@@ -37,7 +32,7 @@ export class Recorder {
   /** Begins with the next info packet: ask for one. onFailure: recording ended by itself. */
   constructor(
     readonly fingertip: Fingertip,
-    readonly kind: RecordingKind,
+    kind: RecordingKind,
     readonly output: Output,
     version: string,
     private readonly onFailure: (why: string) => void,

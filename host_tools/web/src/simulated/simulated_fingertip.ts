@@ -37,7 +37,9 @@ export class SimulatedFingertip implements Line, Hand {
   ) {
     this.worker = new Worker(new URL('./worker.ts', import.meta.url), { type: 'module' });
     this.worker.addEventListener('message', (event: MessageEvent<FromWorker>) => this.take(event.data));
-    this.worker.addEventListener('error', (event) => this.take({ kind: 'failed', why: event.message || 'its worker did not start' }));
+    this.worker.addEventListener('error', (event) =>
+      this.take({ kind: 'failed', why: `${event.message || 'its worker did not start'}; load the page again` }),
+    );
   }
 
   open(receive: (bytes: Uint8Array, at_ms: number) => void, closed: (why: string) => void): Promise<void> {
@@ -109,7 +111,7 @@ export class SimulatedFingertip implements Line, Hand {
         this.opening?.done();
         break;
       case 'failed':
-        this.opening?.failed(new Error(`the simulated fingertip cannot start (${message.why}); load the page again`));
+        this.opening?.failed(new Error(`the simulated fingertip cannot start: ${message.why}`));
         break;
       case 'bytes':
         this.truth = message.truth;

@@ -1,5 +1,5 @@
 /** Runs a simulated fingertip beside the page. */
-import { fetched } from '../../wasm/module.mjs';
+import { WasmError, fetched } from '../../wasm/module.mjs';
 import { RealTime } from '../../wasm/real_time.mjs';
 import type { ShownTruth } from '../view/shown';
 
@@ -13,6 +13,7 @@ export type ToWorker =
 
 export type FromWorker =
   | { kind: 'opened' }
+  /** why: and what to do. */
   | { kind: 'failed'; why: string }
   /** at_ms: since the Unix epoch. */
   | { kind: 'bytes'; bytes: Uint8Array; at_ms: number; truth: ShownTruth }
@@ -54,7 +55,7 @@ async function take(message: ToWorker): Promise<void> {
       await (await fingertip).open();
       post({ kind: 'opened' });
     } catch (error) {
-      post({ kind: 'failed', why: error instanceof Error ? error.message : String(error) });
+      post({ kind: 'failed', why: error instanceof WasmError ? error.message : `${String(error)}; load the page again` });
     }
     return;
   }

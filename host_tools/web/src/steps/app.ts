@@ -28,8 +28,10 @@ export class App {
   /** In the order in which they came. */
   readonly fingertips: Fingertip[] = [];
   readonly recorders = new Map<Fingertip, Recorder>();
+  /** Recordings until they are written whole, or have failed. */
+  readonly unsaved = new Set<Recorder>();
   readonly replays = new Map<Fingertip, Replay>();
-  /** Shows a message to the user, until it is closed; set by main. */
+  /** Shows a message to the user: a plain one for a while, a bad one until it is closed; set by main. */
   notice: (text: string, kind: 'plain' | 'bad') => void = () => undefined;
 
   private readonly listeners = new Set<() => void>();
@@ -40,7 +42,8 @@ export class App {
   private finding: Promise<void> = Promise.resolve();
   private simulated = 0;
 
-  /** Called after a fingertip came or went, and after a recording or a replay began, ended or paused. Returns what ends it. */
+  /** Called after a fingertip came or went, and after a recording or a replay began, ended, paused or got another speed.
+   * Returns what ends it. */
   listen(listener: () => void): () => void {
     this.listeners.add(listener);
     return () => this.listeners.delete(listener);
@@ -119,9 +122,7 @@ export class App {
       return;
     }
     this.leaving.add(fingertip);
-    if (this.recorders.has(fingertip)) {
-      await this.stopRecording(fingertip);
-    }
+    await this.stopRecording(fingertip);
     await fingertip.close().catch(() => undefined);
     for (const [port, each] of this.ports) {
       if (each === fingertip) {
@@ -143,8 +144,8 @@ export class App {
 
   /** False: nothing was chosen. Throws Error, a sentence. */
   async record(fingertip: Fingertip, kind: RecordingKind): Promise<boolean> {
-    const { MEDIA_TYPES, Recorder, chooseOutput, recordingName } = await recording();
-    const output = await chooseOutput(recordingName(fingertip, kind), MEDIA_TYPES[kind]);
+    const { Recorder, chooseOutput, recordingName } = await recording();
+    const output = await chooseOutput(recordingName(fingertip, kind));
     if (!output) {
       return false;
     }
@@ -153,6 +154,7 @@ export class App {
       void this.stopRecording(fingertip);
     });
     this.recorders.set(fingertip, recorder);
+    this.unsaved.add(recorder);
     this.changed();
     try {
       await fingertip.askInfo();
@@ -165,21 +167,24 @@ export class App {
 
   async stopRecording(fingertip: Fingertip): Promise<void> {
     const recorder = this.recorders.get(fingertip);
+    if (!recorder) {
+      return;
+    }
     this.recorders.delete(fingertip);
     this.changed();
     try {
-      await recorder?.finish();
-      if (recorder) {
-        this.notice(`${recorder.output.name}: ${recorder.frames} frames recorded`, 'plain');
-      }
+      await recorder.finish();
+      this.notice(`${recorder.output.name}: ${recorder.frames} frames recorded`, 'plain');
     } catch (error) {
-      if (!recorder?.failure) {
+      if (!recorder.failure) {
         this.notice(wordsOf(error), 'bad');
       }
+    } finally {
+      this.unsaved.delete(recorder);
     }
   }
 
-  /** The port of one that does not answer, for the loader at 1200 baud. */
+  /** The serial port that it has or had; null: it is on none. */
   portOf(fingertip: Fingertip): SerialPort | null {
     return fingertip.line instanceof SerialLine ? fingertip.line.port : null;
   }
@@ -202,7 +207,7 @@ export class App {
     return this.finding;
   }
 
-  /** Opens a port as the fingertip that it was before, if any; else as a new one. */
+  /** Opens a port as the fingertip that it was before, or as another that is away; else as a new one. */
   private async take(port: SerialPort): Promise<void> {
     const known = this.ports.get(port);
     const others = this.fingertips.filter((each) => each.state === 'closed' && each !== known && each.line instanceof SerialLine);

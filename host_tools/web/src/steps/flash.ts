@@ -55,11 +55,14 @@ export function flash(app: App, fingertip: Fingertip): void {
     if (!file) {
       return;
     }
-    image = await imageOf(file);
+    dialog.setMessage('');
+    show(0); // an image that was chosen before is not meant any more
+    const chosen = await imageOf(file);
     const board = fingertip.info?.board;
-    if (board && board !== image.board) {
-      throw new Error(`${file.name} is for board ${image.board}, but this fingertip is a ${board}: choose fingertip-${board}.uf2`);
+    if (board && board !== chosen.board) {
+      throw new Error(`${file.name} is for board ${chosen.board}, but this fingertip is a ${board}: choose fingertip-${board}.uf2`);
     }
+    image = chosen;
     dialog.setMessage(`Firmware ${image.version} ${image.git_hash}, board ${image.board}.`);
     show(1);
   }

@@ -55,7 +55,7 @@ function numbersIn(setting: Setting, text: string): number[] {
   }
   const parts = text.split(':');
   if (parts.length > setting.values.length) {
-    throw new Error(`${setting.label}: "${text}" is too much; ${setting.hint}`);
+    throw new Error(`${setting.label}: "${text}" has too many values; ${setting.hint}`);
   }
   return setting.values.map((value, i) =>
     parts[i] === undefined && value.unlessGiven !== null ? value.unlessGiven : numberIn(value, parts[i] ?? ''),
