@@ -54,9 +54,9 @@ class Bench(contextlib.ExitStack):
         press = ["--scenario", scenario, "--serial", serial, "--pty", port, "--wait-open", "--fast-enumeration", *options]
         return self._until_there(self._start(*emulator, *press, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL), port)
 
-    def fake(self, browser, serial, *options, usb_id=USB_ID):
+    def fake(self, browser, serial, *options):
         """tests/support/fake_device.cpp, with its options."""
-        port, device = browser.ports / f"{usb_id}:{serial}", self._tools.build / "tests/support/fake_device"
+        port, device = browser.ports / f"{USB_ID}:{serial}", self._tools.build / "tests/support/fake_device"
         call = (device, port, f"serial={serial}", f"life={PATIENCE_s}", *options)
         return self._until_there(self._start(*call, stdout=subprocess.DEVNULL), port)
 

@@ -76,11 +76,6 @@ TEST(Objects, CutAndForeignFilesAreRefused) {
   EXPECT_THROW(read_objects(cut.data(), cut.size()), std::runtime_error);
 }
 
-TEST_F(WorldTest, NothingPressesAtFirst) {
-  EXPECT_EQ(run(1.0), 0.0);
-  EXPECT_FALSE(world.truth().contact);
-}
-
 TEST_F(WorldTest, APressIsTheTwins) {
   world.choose(0);
   world.press(2.0, -3.0, 6.0);
