@@ -10,10 +10,8 @@ const USUAL = {
   stored_ms: 3000,
   /** For a sign of another version of the protocol. */
   version_ms: 1000,
-  /** Without a frame, while calibrating. */
-  frame_ms: 5000,
-  /** Without a frame, while examining; the slowest rate is one in ten seconds. */
-  slow_frame_ms: 12_000,
+  /** Without a frame; the slowest rate is one in ten seconds. */
+  frame_ms: 12_000,
   /** A tare: at the slowest rate it takes three frames of 10 s. */
   tared_ms: 35_000,
   /** Until a fingertip has restarted with new firmware. */

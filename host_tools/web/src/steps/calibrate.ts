@@ -5,7 +5,7 @@
 import { load as loadJudges } from '../../wasm/judges.mjs';
 import { fetched } from '../../wasm/module.mjs';
 import { frameOf } from '../core';
-import { Capability, PacketType, Stored } from '../line/line_facts';
+import { PacketType, Stored } from '../line/line_facts';
 import type { Fingertip } from '../model/fingertip';
 import { PATIENCE, pause } from '../model/patience';
 import { sensorsOf } from '../view/health_facts';
@@ -104,7 +104,7 @@ export function calibrate(fingertip: Fingertip): void {
   if (!info) {
     return;
   }
-  const knows_pad = (info.capabilities & Capability.TANGENTIAL) !== 0 && (info.stored & Stored.PAD) !== 0;
+  const knows_pad = (info.stored & Stored.PAD) !== 0;
   const calibrated = (info.stored & Stored.CALIBRATION) !== 0;
   const weight = element('input', { inputmode: 'decimal', autocomplete: 'off' });
   const dialog = new Dialog(

@@ -63,7 +63,7 @@ async function findingsOf(fingertip: Fingertip, dialog: Dialog, bar: HTMLProgres
     await askCrash();
     const before = fingertip.counts;
     measuring = true;
-    while (examination.seconds() < SECONDS && performance.now() - last_ms < PATIENCE.slow_frame_ms) {
+    while (examination.seconds() < SECONDS && performance.now() - last_ms < PATIENCE.frame_ms) {
       await pause(100);
       if (dialog.is_closed) {
         return [];
