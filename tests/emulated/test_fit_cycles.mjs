@@ -12,13 +12,13 @@ import { Prng } from '../../host_tools/simulation/emulator/prng.mjs';
 import { Bench } from '../../host_tools/report/fit/on_chip/fit_on_chip.mjs';
 
 /** The build's iterations from cold, with everything: readings, guess, amplitude, force, errors, what rubber keeps, shape, flags. */
-const COLD_CYCLES_MAX = 31500;
+const COLD_CYCLES_MAX = 31300;
 /** The same without some of the sensors. */
 const MASKED_CYCLES_MAX = 49300;
 /** A fit with every sensor that looks for an outlier and finds none. */
-const SEARCH_CYCLES_MAX = 46600;
+const SEARCH_CYCLES_MAX = 46500;
 /** A fit that finds an outlier: the fit, the search, and the fit without it. */
-const OUTLIER_CYCLES_MAX = 96500;
+const OUTLIER_CYCLES_MAX = 96400;
 /** A frame's tangential estimate, which follows the fit, with the image's pad. */
 const TANGENTIAL_CYCLES_MAX = 43000;
 /** A part of the look for a load that is not estimated, which follows the frame's packet (fit_bias.h), and all of them. */

@@ -15,7 +15,7 @@ FIGURES = """observable_presses p99_9_um shipped_p99_9_um shipped_above_100um ab
     masked_peak_above_100um_d bad_unflagged_percent_worst good_flagged_percent_c good_flagged_percent_d cold_cycles masked_cycles
     speed_vs_ceres speed_vs_tinysolver""".split()
 # Worst over the presses measured here, with a past; the goals are in fit.py.
-COLD_CYCLES_MAX = 31500
+COLD_CYCLES_MAX = 31300
 MASKED_CYCLES_MAX = 62000
 FEW = "--limit 600 --budget 0.25 --passes 1".split()
 
