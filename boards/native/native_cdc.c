@@ -115,7 +115,7 @@ bool cdc_is_open(void) { return cdc.wanted && !cdc.suspended; }
 
 bool cdc_is_suspended(void) { return cdc.suspended; }
 
-uint32_t cdc_news(void) { return cdc.news; }
+uint32_t cdc_event_count(void) { return cdc.news; }
 
 uint32_t cdc_close_count(void) { return cdc.close_count; }
 

@@ -182,14 +182,14 @@ void port_watchdog_feed(void) {
   native.fed_us = native.now_us;
 }
 
-void port_alive(enum port_part part) {
+void port_report_alive(enum port_part part) {
   native.alive_us[part] = native.now_us;
   native.watched[part] = true;
 }
 
-void port_at(enum crash_activity activity) { (void)activity; }
+void port_set_activity(enum crash_activity activity) { (void)activity; }
 
-void port_event(enum crash_event event, uint8_t detail) {
+void port_log_event(enum crash_event event, uint8_t detail) {
   native.last_event = event;
   native.last_event_detail = detail;
 }

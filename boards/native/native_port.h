@@ -23,7 +23,7 @@ void native_set_serial_number(const char *text);
 /* How the firmware ended before; kept over starts. */
 void native_set_last_crash(const struct crash_record *crash);
 
-/* The last argument of port_event(). */
+/* The last argument of port_log_event(). */
 enum crash_event native_last_event(uint8_t *detail);
 
 /* next_us returns when the source has its next event, UINT64_MAX for never. */

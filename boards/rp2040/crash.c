@@ -169,7 +169,7 @@ void crash_watch(void) {
   rp2040_irq_enable(RP2040_IRQ_TIMER_2);
 }
 
-void port_alive(enum port_part part) {
+void port_report_alive(enum port_part part) {
   trace.alive_us[part] = TIMER_TIMERAWL;
   trace.watched[part] = true;
 }
@@ -184,10 +184,10 @@ void port_watchdog_feed(void) {
   TIMER_ALARM2 = (uint32_t)now_us + PORT_WATCHDOG_PERIOD_us;
 }
 
-void port_at(enum crash_activity activity) { trace.activity = (uint8_t)activity; }
+void port_set_activity(enum crash_activity activity) { trace.activity = (uint8_t)activity; }
 
 /* One of a kind at a time, so that what goes on does not push out what led to it. */
-void port_event(enum crash_event event, uint8_t detail) {
+void port_log_event(enum crash_event event, uint8_t detail) {
   struct event *newest = &trace.events[(trace.event_count - 1) % CRASH_EVENTS];
   if (newest->code != event)
     newest = &trace.events[trace.event_count++ % CRASH_EVENTS];

@@ -4,8 +4,8 @@
 #include "common/status.h"
 
 enum pico_supply {
-  PICO_SUPPLY_FRUGAL, /* the regulator of 3V3 switches when it must: it draws less itself */
-  PICO_SUPPLY_STEADY, /* at a fixed rate: less ripple, for it feeds the sensors */
+  PICO_SUPPLY_PFM, /* the regulator of 3V3 switches when it must: it draws less itself */
+  PICO_SUPPLY_PWM, /* at a fixed rate: less ripple, for it feeds the sensors */
 };
 
 /* Takes the pin into use, steady, but on a Pico W, where it is another's (FINGERTIP_PICO_W): the supply stays frugal.

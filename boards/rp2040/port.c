@@ -3,8 +3,8 @@
 #include "rp2040/crash.h"
 #include "rp2040/event.h"
 #include "rp2040/flash.h"
-#include "rp2040/guard.h"
 #include "rp2040/interrupts.h"
+#include "rp2040/mpu.h"
 #include "rp2040/nvic.h"
 #include "rp2040/resets.h"
 #include "rp2040/sio_regs.h"
@@ -118,7 +118,7 @@ _Noreturn void port_reboot_to_loader(void) {
 
   port_worker_stop();
   disable_interrupts();
-  guard_end(); /* the boot ROM's tables begin at address 0 */
+  mpu_disable(); /* the boot ROM's tables begin at address 0 */
   WATCHDOG_SCRATCH0 = 0;
   extern const uint16_t __rom_function_table, __rom_function_lookup;
   const uint16_t *table = (const uint16_t *)(uintptr_t)__rom_function_table;
@@ -142,7 +142,7 @@ static void read_serial_number(void) {
 void port_start(void) {
   extern const uint32_t __stack_guard[], __code_end[];
   crash_start();
-  guard_memory(__stack_guard, 12u, __code_end);
+  mpu_protect(__stack_guard, 12u, __code_end);
   rp2040_irq_set_priorities();
   if (resets_release(RESETS_TIMER) != FT_OK)
     port_panic();

@@ -4,7 +4,7 @@
  *
  * It waits in deep sleep, or the other processor's would not stop the clocks (datasheet 2.11.5). */
 #include "port/port.h"
-#include "rp2040/guard.h"
+#include "rp2040/mpu.h"
 #include "rp2040/sio_regs.h"
 
 #define SCB_SCR REG32(0xe000ed10u)
@@ -24,7 +24,7 @@ extern const uint32_t __second_stack_guard[], __vectors[];
 static void send_event(void) { __asm volatile("sev" ::: "memory"); }
 
 static _Noreturn void run(void) {
-  guard_memory(__second_stack_guard, 8u, work.context); /* what is before it is the first one's */
+  mpu_protect(__second_stack_guard, 8u, work.context); /* what is before it is the first one's */
   SCB_SCR = SCB_SCR_SLEEPDEEP;
   for (;;) {
     while (work.serve(work.context))
@@ -73,7 +73,7 @@ bool port_worker_start(bool (*serve)(void *context), void *context) {
   const bool started = launch();
   if (!started) {
     port_worker_stop();
-    port_event(CRASH_EVENT_WORKER, 1);
+    port_log_event(CRASH_EVENT_WORKER, 1);
   }
   return started;
 }

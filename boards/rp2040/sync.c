@@ -17,7 +17,7 @@ enum {
   SLOTS = 1 << SLOTS_LOG2,
   SAMPLES = 15, /* of a level, three cycles apart, before its edge counts */
 };
-_Static_assert(PORT_SYNC_KEPT + 8 < SLOTS, "a reader has time before what it reads is overwritten");
+_Static_assert(PORT_SYNC_CAPACITY + 8 < SLOTS, "a reader has time before what it reads is overwritten");
 
 #define SECOND_us 1000000u
 #define PULSE_us 100000u
@@ -180,8 +180,8 @@ bool port_sync_take(struct port_sync_edge *edge) {
   if (next >= SLOTS) /* it was reset just now */
     return false;
   const uint32_t newest = numbers[(next - 1u) % SLOTS] + 1u;
-  if (newest - sync.taken > PORT_SYNC_KEPT)
-    sync.taken = newest - PORT_SYNC_KEPT;
+  if (newest - sync.taken > PORT_SYNC_CAPACITY)
+    sync.taken = newest - PORT_SYNC_CAPACITY;
   if (newest == sync.taken)
     return false;
   const uint32_t slot = (next - (newest - sync.taken)) % SLOTS;

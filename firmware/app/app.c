@@ -34,7 +34,7 @@ void app_on_event(struct app *app) {
   }
   port_alarm_at_us(wake_us < tick->next_us ? wake_us : tick->next_us);
   if (scan_is_well(&app->scan, now_us)) {
-    port_alive(PORT_PART_SCAN);
+    port_report_alive(PORT_PART_SCAN);
   }
 }
 
@@ -78,7 +78,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
   stages_start(&app->stages);
   store_init(&app->store, geometry.sensor_count);
   app->active = true;
-  app->second.began_us = port_now_us();
+  app->statistics.began_us = port_now_us();
   start_usb();
   commands_start(app);
   set_pace(app);
@@ -89,20 +89,20 @@ void app_process_frame(struct app *app, uint64_t taken_us) {
   struct findings *found = &app->found;
   stages_process(&app->stages, found, (uint32_t)taken_us);
   stages_send(&app->stages, found, app->commands.streams, &app->line);
-  stages_follow(&app->stages, found, &app->scan);
+  stages_after_send(&app->stages, found, &app->scan);
 }
 
 /* While the bus sleeps so do the sensors, and once they do, the chip. */
 static bool may_save_power(const struct app *app) { return cdc_is_suspended() && scan_rests(&app->scan); }
 
-static void follow_suspend(struct app *app) {
+static void update_suspend(struct app *app) {
   const bool saves = may_save_power(app);
   if (saves != app->saves_power) {
     if (saves) {
       stages_pause(&app->stages, true);
     }
     port_save_power(saves);
-    port_event(saves ? CRASH_EVENT_ASLEEP : CRASH_EVENT_AWAKE, 0);
+    port_log_event(saves ? CRASH_EVENT_ASLEEP : CRASH_EVENT_AWAKE, 0);
     const uint64_t now_us = port_now_us();
     if (saves) {
       app->saving_since_us = now_us;
@@ -118,11 +118,11 @@ static void follow_suspend(struct app *app) {
   scan_rest(&app->scan, cdc_is_suspended());
 }
 
-static void follow_port(struct app *app) {
+static void update_port(struct app *app) {
   const uint32_t close_count = cdc_close_count();
   if (close_count != app->close_count) {
     app->close_count = close_count;
-    port_event(CRASH_EVENT_CLOSED, 0);
+    port_log_event(CRASH_EVENT_CLOSED, 0);
     commands_end_session(app);
   }
   if (cdc_loader_requested() && app->commands.loader_at_us == 0) {
@@ -132,48 +132,48 @@ static void follow_port(struct app *app) {
 
 static uint8_t saturate_u8(uint32_t value) { return value < UINT8_MAX ? (uint8_t)value : UINT8_MAX; }
 
-static void note_more(uint32_t *before, uint32_t now, enum crash_event event) {
+static void log_increase(uint32_t *before, uint32_t now, enum crash_event event) {
   if (now != *before) {
-    port_event(event, saturate_u8(now - *before));
+    port_log_event(event, saturate_u8(now - *before));
     *before = now;
   }
 }
 
 /* What went wrong in this second, for the record of a crash that may follow. */
-static void note_troubles(struct second *second, const struct scan *scan) {
-  note_more(&second->timeouts, scan_read(&scan->counters.bus_timeouts), CRASH_EVENT_BUS);
-  note_more(&second->skipped, scan_read(&scan->counters.frames_skipped), CRASH_EVENT_SKIPPED);
+static void log_faults(struct statistics *statistics, const struct scan *scan) {
+  log_increase(&statistics->timeouts, scan_read(&scan->counters.bus_timeouts), CRASH_EVENT_BUS);
+  log_increase(&statistics->skipped, scan_read(&scan->counters.frames_skipped), CRASH_EVENT_SKIPPED);
   const sensor_map present = scan_read_map(&scan->present);
-  if (present != second->present) {
-    second->present = present;
-    port_event(CRASH_EVENT_SENSORS, 0);
+  if (present != statistics->present) {
+    statistics->present = present;
+    port_log_event(CRASH_EVENT_SENSORS, 0);
   }
 }
 
-static void measure_second(struct second *second, const struct scan *scan, uint64_t now_us) {
-  const uint32_t elapsed_us = (uint32_t)(now_us - second->began_us), elapsed_ms = elapsed_us / 1000u;
-  second->uptime_rest_us += elapsed_us;
-  second->uptime_s += second->uptime_rest_us / 1000000u;
-  second->uptime_rest_us %= 1000000u;
+static void update_statistics(struct statistics *statistics, const struct scan *scan, uint64_t now_us) {
+  const uint32_t elapsed_us = (uint32_t)(now_us - statistics->began_us), elapsed_ms = elapsed_us / 1000u;
+  statistics->uptime_rest_us += elapsed_us;
+  statistics->uptime_s += statistics->uptime_rest_us / 1000000u;
+  statistics->uptime_rest_us %= 1000000u;
   const uint32_t frames = scan_read(&scan->counters.frames);
-  second->rate_mHz = (frames - second->frames) * 1000000u / elapsed_ms;
-  const uint32_t asleep_ms = (uint32_t)second->asleep_us / 1000u;
+  statistics->rate_mHz = (frames - statistics->frames) * 1000000u / elapsed_ms;
+  const uint32_t asleep_ms = (uint32_t)statistics->asleep_us / 1000u;
   const uint32_t asleep_permille = asleep_ms < elapsed_ms ? asleep_ms * 1000u / elapsed_ms : 1000u;
-  second->busy_permille = (uint16_t)(1000u - asleep_permille);
-  second->began_us = now_us;
-  second->frames = frames;
-  second->asleep_us = 0;
+  statistics->busy_permille = (uint16_t)(1000u - asleep_permille);
+  statistics->began_us = now_us;
+  statistics->frames = frames;
+  statistics->asleep_us = 0;
 }
 
 /* after_frame: the next one is some time off. */
 static void each_second(struct app *app, uint64_t now_us, bool after_frame) {
-  const uint32_t elapsed_us = (uint32_t)(now_us - app->second.began_us);
+  const uint32_t elapsed_us = (uint32_t)(now_us - app->statistics.began_us);
   if (elapsed_us < (after_frame ? 1000000u : 1000000u + FRAME_WAIT_us)) {
     return;
   }
-  port_at(CRASH_AT_HEALTH);
-  measure_second(&app->second, &app->scan, now_us);
-  note_troubles(&app->second, &app->scan);
+  port_set_activity(CRASH_AT_HEALTH);
+  update_statistics(&app->statistics, &app->scan, now_us);
+  log_faults(&app->statistics, &app->scan);
   stages_each_second(&app->stages, &app->found);
   if (app->commands.streams & WIRE_STREAM_HEALTH) {
     status_send_health(app, now_us);
@@ -183,40 +183,40 @@ static void each_second(struct app *app, uint64_t now_us, bool after_frame) {
 /* The round that follows a sleep costs a few dozen cycles unless there is something to do: bus interrupts wake the core
  * many times a frame. */
 void app_run(struct app *app) {
-  const uint32_t news = cdc_news();
+  const uint32_t usb_events = cdc_event_count();
   const bool tick = atomic_load_explicit(&app->tick.is_due, memory_order_relaxed) != 0;
-  if (!app->active && !tick && news == app->news && !scan_has_news(&app->scan) && may_save_power(app) == app->saves_power) {
+  if (!app->active && !tick && usb_events == app->usb_events && !scan_has_news(&app->scan) && may_save_power(app) == app->saves_power) {
     port_sleep();
     return;
   }
   port_watchdog_feed();
   if (!app->active) {
-    app->second.asleep_us += port_now_us() - app->second.idle_since_us;
+    app->statistics.asleep_us += port_now_us() - app->statistics.idle_since_us;
   }
   atomic_store_explicit(&app->tick.is_due, 0, memory_order_relaxed);
-  follow_suspend(app);
-  if (news != app->news || tick || app->active) {
-    app->news = news;
-    port_at(CRASH_AT_COMMANDS);
-    follow_port(app); /* before what the next session asks for */
+  update_suspend(app);
+  if (usb_events != app->usb_events || tick || app->active) {
+    app->usb_events = usb_events;
+    port_set_activity(CRASH_AT_COMMANDS);
+    update_port(app); /* before what the next session asks for */
     app->active = commands_receive(app);
     set_pace(app);
   }
-  port_at(CRASH_AT_READINGS);
+  port_set_activity(CRASH_AT_READINGS);
   const uint64_t taken_us = port_now_us(); /* taking compensates the readings */
   const bool has_frame = scan_take(&app->scan, &app->found.frame);
   if (has_frame) {
     app_process_frame(app, taken_us);
-    app->second.asleep_us += app->found.slept_us;
+    app->statistics.asleep_us += app->found.slept_us;
     app->active = true;
   }
   const uint64_t now_us = port_now_us();
   each_second(app, now_us, has_frame);
-  commands_follow_store(app, now_us); /* after the frame, which it must not keep waiting */
+  commands_poll_store(app, now_us); /* after the frame, which it must not keep waiting */
   stages_each_round(&app->stages, now_us, app->commands.streams, &app->line);
   if (app->commands.loader_at_us != 0 && now_us >= app->commands.loader_at_us && !store_is_writing(&app->store)) {
     port_reboot_to_loader();
   }
-  app->second.idle_since_us = now_us;
-  port_at(CRASH_AT_REST);
+  app->statistics.idle_since_us = now_us;
+  port_set_activity(CRASH_AT_REST);
 }

@@ -25,7 +25,7 @@ struct tick {
 };
 
 /* The second under way, and what the one before it measured. */
-struct second {
+struct statistics {
   uint64_t began_us;
   uint64_t idle_since_us; /* unless app.active */
   uint64_t asleep_us;
@@ -38,14 +38,13 @@ struct second {
 };
 
 struct app {
-  uint32_t news;        /* of the port, in the last round */
-  uint32_t close_count; /* the same */
-  bool active;          /* the last round had something to do, so there may be more */
+  uint32_t usb_events, close_count; /* of the port, in the last round */
+  bool active;                      /* the last round had something to do, so there may be more */
   bool saves_power;
   uint64_t saving_since_us; /* if .saves_power */
   struct tick tick;         /* shared with the event context, and so is .scan, under its own rules */
   struct commands commands;
-  struct second second;
+  struct statistics statistics;
   struct findings found; /* of the frame under way */
   struct line line;
   struct store store;

@@ -54,7 +54,7 @@ static enum ft_status keep_settings(struct app *app, uint8_t keep) {
   }
   settings.rate_mHz = app->commands.rate_mHz;
   settings.osr = app->commands.osr;
-  stages_keep_settings(&app->stages, &settings);
+  stages_get_settings(&app->stages, &settings);
   return store_put_settings(&app->store, keep ? &settings : NULL);
 }
 
@@ -98,7 +98,7 @@ static enum ft_status obey(struct app *app, const struct wire_packet *command, u
     }
     commands_plan_loader(&app->commands, now_us);
     return FT_OK;
-  default: return stages_obey(&app->stages, command, &app->store);
+  default: return stages_execute(&app->stages, command, &app->store);
   }
 }
 
@@ -125,7 +125,7 @@ static void acknowledge(struct app *app, const struct wire_ack *ack, uint64_t no
 static __attribute__((noinline)) void answer_command(struct app *app, uint64_t now_us) {
   const struct wire_packet *command = &app->line.packet;
   struct wire_ack ack = {.command = command->type, .sequence = command->sequence, .host_time_us = command->t_us};
-  port_event(CRASH_EVENT_COMMAND, ack.command);
+  port_log_event(CRASH_EVENT_COMMAND, ack.command);
   const enum ft_status status = obey(app, command, now_us);
   if (status == FT_PENDING) {
     app->commands.pending = ack;
@@ -145,17 +145,17 @@ static __attribute__((noinline)) void answer_command(struct app *app, uint64_t n
   }
 }
 
-void commands_follow_store(struct app *app, uint64_t now_us) {
+void commands_poll_store(struct app *app, uint64_t now_us) {
   if (!store_is_writing(&app->store)) {
     return;
   }
-  port_at(CRASH_AT_STORE);
+  port_set_activity(CRASH_AT_STORE);
   const enum ft_status status = store_poll(&app->store, now_us);
   if (status == FT_PENDING) {
     return;
   }
-  port_event(CRASH_EVENT_STORED, status != FT_OK);
-  if (status == FT_OK && app->store.of_pad) {
+  port_log_event(CRASH_EVENT_STORED, status != FT_OK);
+  if (status == FT_OK && app->store.pad_changes) {
     stages_use_stored_pad(&app->stages, &app->found, &app->store.content);
   }
   if (app->commands.pending.command != 0) {

@@ -1,4 +1,4 @@
-/* The commands that the host sends, and what the fingertip keeps of them. */
+/* The host's commands, and the state that they set. */
 #pragma once
 
 #include "wire/packet.h"
@@ -25,7 +25,7 @@ void commands_start(struct app *app);
 bool commands_receive(struct app *app);
 
 /* Each round: takes a write to the store a step further, and answers its command at the end. */
-void commands_follow_store(struct app *app, uint64_t now_us);
+void commands_poll_store(struct app *app, uint64_t now_us);
 
 /* The host that sent commands is gone. */
 void commands_end_session(struct app *app);

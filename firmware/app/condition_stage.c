@@ -4,15 +4,15 @@
 
 #include <string.h>
 
-void condition_stage_process(struct condition_stage *own, struct findings *found) {
-  condition_frame(&own->condition, &found->frame, own->has_gains ? &own->gains : NULL, &found->conditioned);
+void condition_stage_process(struct condition_stage *stage, struct findings *found) {
+  condition_frame(&stage->condition, &found->frame, stage->has_gains ? &stage->gains : NULL, &found->conditioned);
 }
 
-void condition_stage_follow(struct condition_stage *own, const struct findings *found) {
-  condition_follow(&own->condition, &found->frame, &found->conditioned);
+void condition_stage_after_send(struct condition_stage *stage, const struct findings *found) {
+  condition_follow(&stage->condition, &found->frame, &found->conditioned);
 }
 
-void condition_stage_put(const struct condition_stage *own, const struct findings *found, struct wire_raw *packet) {
+void condition_stage_fill(const struct condition_stage *stage, const struct findings *found, struct wire_raw *packet) {
   const struct frame *frame = &found->frame;
   packet->frame = frame->number;
   packet->flags = found->contact.flags;
@@ -23,12 +23,12 @@ void condition_stage_put(const struct condition_stage *own, const struct finding
   packet->sensor_count = frame->sensor_count;
   const size_t length = frame->sensor_count * sizeof packet->pressure_Pa_q10[0];
   memcpy(packet->pressure_Pa_q10, frame->pressure_Pa_q10, length);
-  memcpy(packet->baseline_Pa_q10, own->condition.zero_Pa_q10, length);
+  memcpy(packet->baseline_Pa_q10, stage->condition.zero_Pa_q10, length);
 }
 
-void condition_stage_use_calibration(struct condition_stage *own, const struct calibration *calibration) {
-  own->has_gains = calibration != NULL;
+void condition_stage_use_calibration(struct condition_stage *stage, const struct calibration *calibration) {
+  stage->has_gains = calibration != NULL;
   for (unsigned k = 0; calibration && k < geometry.sensor_count; k++) {
-    own->gains.inverse_q16[k] = (uint32_t)(65536.0f / calibration->sensors[k].gain + 0.5f);
+    stage->gains.inverse_q16[k] = (uint32_t)(65536.0f / calibration->sensors[k].gain + 0.5f);
   }
 }

@@ -4,7 +4,7 @@
 
 static bool is_sensor_doubtful(const struct findings *found) { return (found->frame.doubtful & found->conditioned.usable) != 0; }
 
-void contact_stage_gather(struct findings *found, bool calibrated) {
+void contact_stage_collect(struct findings *found, bool calibrated) {
   const struct frame *frame = &found->frame;
   const struct conditioned *conditioned = &found->conditioned;
   struct contact_input *input = &found->contact_input;
@@ -29,7 +29,7 @@ void contact_stage_hold(struct findings *found) {
 
 static uint16_t saturated(uint64_t value) { return value < UINT16_MAX ? (uint16_t)value : UINT16_MAX; }
 
-void contact_stage_put(const struct findings *found, struct wire_contact *packet) {
+void contact_stage_fill(const struct findings *found, struct wire_contact *packet) {
   const struct frame *frame = &found->frame;
   packet->frame = frame->number;
   packet->flags = found->contact.flags;

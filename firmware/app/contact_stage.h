@@ -5,11 +5,11 @@
 #include "app/findings.h"
 #include "wire/packet.h"
 
-/* Gathers what the flags are made of. */
-void contact_stage_gather(struct findings *found, bool calibrated);
+/* Collects the input of the flags. */
+void contact_stage_collect(struct findings *found, bool calibrated);
 
-/* In a held frame the flags are those of the frame before, but for two. */
+/* A held frame repeats the flags of the frame before, except two. */
 void contact_stage_hold(struct findings *found);
 
 /* Fills in what this stage knows of a contact packet. */
-void contact_stage_put(const struct findings *found, struct wire_contact *packet);
+void contact_stage_fill(const struct findings *found, struct wire_contact *packet);

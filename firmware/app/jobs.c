@@ -22,7 +22,7 @@ void jobs_start(struct jobs *jobs) {
 
 void jobs_begin_frame(struct jobs *jobs, uint64_t t_us) {
   const uint64_t interval_us = t_us - jobs->frame_us;
-  jobs->pace_us = interval_us < jobs->interval_us ? interval_us : jobs->interval_us;
+  jobs->short_interval_us = interval_us < jobs->interval_us ? interval_us : jobs->interval_us;
   jobs->interval_us = interval_us;
   jobs->frame_us = t_us;
 }

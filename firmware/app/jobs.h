@@ -16,11 +16,11 @@ enum job {
 
 struct jobs {
   struct worker worker[JOBS];
-  bool has_processor;   /* the second processor runs them */
-  uint32_t starts;      /* of the processor so far: with each one all questions are forgotten */
-  uint64_t frame_us;    /* time of the frame under way */
-  uint64_t interval_us; /* between it and the frame before */
-  uint64_t pace_us;     /* the shorter one of the last two intervals: one long pause does not make the frames slow */
+  bool has_processor;         /* the second processor runs them */
+  uint32_t starts;            /* of the processor so far: with each one all questions are forgotten */
+  uint64_t frame_us;          /* time of the frame under way */
+  uint64_t interval_us;       /* between it and the frame before */
+  uint64_t short_interval_us; /* the shorter of the last two intervals, so that one pause does not count */
 };
 
 /* Before jobs_start: what does this job. */
@@ -38,7 +38,7 @@ void jobs_cancel(struct jobs *jobs);
 static inline bool jobs_is_free(const struct jobs *jobs, enum job job) { return worker_is_free(&jobs->worker[job]); }
 
 /* Does this job here if there is no second processor. */
-static inline void jobs_serve_alone(struct jobs *jobs, enum job job) {
+static inline void jobs_run_here(struct jobs *jobs, enum job job) {
   if (!jobs->has_processor) {
     worker_serve(&jobs->worker[job]);
   }

@@ -1,4 +1,4 @@
-/* The line to the host: packets in and out, one at a time. */
+/* The connection to the host: packets in and out, one at a time. */
 #pragma once
 
 #include "common/status.h"

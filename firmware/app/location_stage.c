@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Interval from which on each frame has time for its own search for an outlier, us: the search takes up to 1 ms. */
+/* Interval from which on each frame has time for its stage search for an outlier, us: the search takes up to 1 ms. */
 #define OUTLIER_EACH_FRAME_us 2000u
 /* Change of the force scale with the air pressure, per kPa: on one of two cast pads the response to one weight doubled
  * over 172 kPa, on the other it did not change (the arrays of host_tools/report/real). */
@@ -28,39 +28,39 @@
 #define FIT(array, pressure, usable, settings, outliers, result) fit_gaussian_grid_small(array, pressure, usable, settings, result)
 #endif
 
-void location_stage_start(struct location_stage *own) {
-  if (INIT_ARRAY(&own->array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK) {
+void location_stage_start(struct location_stage *stage) {
+  if (INIT_ARRAY(&stage->array, geometry.sensor_count, geometry.x_mm, geometry.y_mm, geometry.pitch_mm) != FT_OK) {
     port_panic();
   }
-  own->settings.iterations = DEFAULT_FIT_ITERATIONS;
-  own->prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
-  own->prior_sd_mm = DEFAULT_PRIOR_WIDTH_mm;
-  fit_set_errors(&own->settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
-  own->settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
+  stage->settings.iterations = DEFAULT_FIT_ITERATIONS;
+  stage->prior_sigma_mm = DEFAULT_PRIOR_SIGMA_mm;
+  stage->prior_sd_mm = DEFAULT_PRIOR_WIDTH_mm;
+  fit_set_errors(&stage->settings, DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
+  stage->settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
 }
 
-void location_stage_process(struct location_stage *own, const int32_t *past_sd_Pa_q10, struct findings *found) {
+void location_stage_process(struct location_stage *stage, const int32_t *past_sd_Pa_q10, struct findings *found) {
   const uint32_t t_us = (uint32_t)found->frame.t_us;
-  if (!found->conditioned.contact || t_us - own->frame_us >= OUTLIER_EACH_FRAME_us) {
-    memset(&own->outliers, 0, sizeof own->outliers);
+  if (!found->conditioned.contact || t_us - stage->frame_us >= OUTLIER_EACH_FRAME_us) {
+    memset(&stage->outliers, 0, sizeof stage->outliers);
   }
-  own->frame_us = t_us;
+  stage->frame_us = t_us;
   if (found->conditioned.contact) {
-    own->settings.noise_Pa_q10 = found->frame.noise_Pa_q10;
-    memcpy(own->settings.past_sd_Pa_q10, past_sd_Pa_q10, sizeof own->settings.past_sd_Pa_q10);
-    FIT(&own->array, found->conditioned.pressure_Pa_q10, found->conditioned.usable, &own->settings, &own->outliers, &found->fit);
-    own->failures += !(found->fit.flags & CONTACT_FLAG_FIT_VALID);
+    stage->settings.noise_Pa_q10 = found->frame.noise_Pa_q10;
+    memcpy(stage->settings.past_sd_Pa_q10, past_sd_Pa_q10, sizeof stage->settings.past_sd_Pa_q10);
+    FIT(&stage->array, found->conditioned.pressure_Pa_q10, found->conditioned.usable, &stage->settings, &stage->outliers, &found->fit);
+    stage->failures += !(found->fit.flags & CONTACT_FLAG_FIT_VALID);
   } else {
     memset(&found->fit, 0, sizeof found->fit);
   }
 }
 
-void location_stage_weigh(const struct contact_settings *contact, struct findings *found) {
+void location_stage_set_force(const struct contact_settings *contact, struct findings *found) {
   const float peak_Pa = (1.0f / 1024.0f) * (float)found->conditioned.peak_Pa_q10;
-  found->force = contact_weigh(contact, &found->fit, found->frame.saturated ? INFINITY : peak_Pa);
+  found->force = contact_scale_force(contact, &found->fit, found->frame.saturated ? INFINITY : peak_Pa);
 }
 
-void location_stage_put(const struct findings *found, struct wire_contact *packet) {
+void location_stage_fill(const struct findings *found, struct wire_contact *packet) {
   packet->sensors_used = found->fit.used;
   packet->x_mm = found->fit.x_mm;
   packet->y_mm = found->fit.y_mm;
@@ -78,36 +78,36 @@ void location_stage_put(const struct findings *found, struct wire_contact *packe
 static float millimetres(uint16_t length_um) { return 1e-3f * (float)length_um; }
 
 /* The prior that is set, or else the calibration's, and the calibration's dip. */
-static void set_shape(struct location_stage *own) {
-  struct fit_settings *settings = &own->settings;
-  const bool is_set = own->prior_sd_mm > 0.0f;
-  const struct calibration *calibration = DEFAULT_USES_SHAPE ? own->calibration : NULL;
-  const bool has_prior = calibration && !own->has_profile;
-  settings->prior_sigma_mm = is_set ? own->prior_sigma_mm : has_prior ? millimetres(calibration->sigma_um) : 0.0f;
-  settings->prior_width_mm = is_set ? own->prior_sd_mm : has_prior ? millimetres(calibration->sigma_sd_um) : 0.0f;
+static void set_shape(struct location_stage *stage) {
+  struct fit_settings *settings = &stage->settings;
+  const bool is_set = stage->prior_sd_mm > 0.0f;
+  const struct calibration *calibration = DEFAULT_USES_SHAPE ? stage->calibration : NULL;
+  const bool has_prior = calibration && !stage->has_profile;
+  settings->prior_sigma_mm = is_set ? stage->prior_sigma_mm : has_prior ? millimetres(calibration->sigma_um) : 0.0f;
+  settings->prior_width_mm = is_set ? stage->prior_sd_mm : has_prior ? millimetres(calibration->sigma_sd_um) : 0.0f;
   settings->dip_share = calibration ? (1.0f / 65536.0f) * (float)calibration->dip_share_q16 : 0.0f;
   settings->dip_sd_mm = calibration ? millimetres(calibration->dip_sd_um) : 0.0f;
-  settings->cut_noises = own->has_profile ? 0 : DEFAULT_CUT_NOISES;
+  settings->cut_noises = stage->has_profile ? 0 : DEFAULT_CUT_NOISES;
 }
 
-enum ft_status location_stage_set_prior(struct location_stage *own, float sigma_mm, float sd_mm) {
+enum ft_status location_stage_set_prior(struct location_stage *stage, float sigma_mm, float sd_mm) {
   const bool none = sigma_mm == 0.0f && sd_mm == 0.0f;
   const bool possible = sigma_mm >= WIRE_PRIOR_SIGMA_MIN_mm && sigma_mm <= WIRE_PRIOR_SIGMA_MAX_mm && sd_mm >= WIRE_PRIOR_WIDTH_MIN_mm &&
                         sd_mm <= WIRE_PRIOR_WIDTH_MAX_mm;
   if (!none && !possible) {
     return FT_ERR_ARGUMENT;
   }
-  own->prior_sigma_mm = sigma_mm;
-  own->prior_sd_mm = sd_mm;
-  set_shape(own);
+  stage->prior_sigma_mm = sigma_mm;
+  stage->prior_sd_mm = sd_mm;
+  set_shape(stage);
   return FT_OK;
 }
 
-enum ft_status location_stage_set_limit(struct location_stage *own, float limit_mm) {
+enum ft_status location_stage_set_limit(struct location_stage *stage, float limit_mm) {
   if (!(limit_mm >= WIRE_LOCATION_LIMIT_MIN_mm && limit_mm <= WIRE_LOCATION_LIMIT_MAX_mm)) {
     return FT_ERR_ARGUMENT;
   }
-  own->settings.location_sd_limit_mm = limit_mm;
+  stage->settings.location_sd_limit_mm = limit_mm;
   return FT_OK;
 }
 
@@ -116,22 +116,22 @@ static int32_t q15_pitches(int16_t length_um) {
   return q15 > 32767.0f ? 32767 : q15 < -32767.0f ? -32767 : (int32_t)q15;
 }
 
-void location_stage_use_calibration(struct location_stage *own, const struct calibration *calibration) {
-  own->calibration = calibration;
+void location_stage_use_calibration(struct location_stage *stage, const struct calibration *calibration) {
+  stage->calibration = calibration;
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     const struct sensor_calibration *sensor = calibration ? &calibration->sensors[k] : NULL;
     if (sensor) {
-      own->deviations[k] = (struct fit_deviation){q15_pitches(sensor->off_x_um), q15_pitches(sensor->off_y_um), sensor->wider_q15};
+      stage->deviations[k] = (struct fit_deviation){q15_pitches(sensor->off_x_um), q15_pitches(sensor->off_y_um), sensor->wider_q15};
     }
-    own->settings.gain_sd_q16[k] = (uint16_t)((sensor ? sensor->gain_sd : DEFAULT_GAIN_SD) * 65536.0f + 0.5f);
+    stage->settings.gain_sd_q16[k] = (uint16_t)((sensor ? sensor->gain_sd : DEFAULT_GAIN_SD) * 65536.0f + 0.5f);
   }
-  own->settings.deviations = DEFAULT_USES_SHAPE && calibration ? own->deviations : NULL;
-  set_shape(own);
+  stage->settings.deviations = DEFAULT_USES_SHAPE && calibration ? stage->deviations : NULL;
+  set_shape(stage);
 }
 
-void location_stage_use_profile(struct location_stage *own, bool has_profile) {
-  own->has_profile = has_profile;
-  set_shape(own);
+void location_stage_use_profile(struct location_stage *stage, bool has_profile) {
+  stage->has_profile = has_profile;
+  set_shape(stage);
 }
 
 /* Standard deviation that the air adds to the force scale. */
@@ -149,9 +149,9 @@ static float sd_by_air(const struct calibration *calibration, const struct condi
   return calibration->force_scale * FORCE_SHARE_PER_kPa * off_kPa;
 }
 
-void location_stage_scale_force(const struct location_stage *own, const struct condition *condition, bool tared,
-                                struct contact_settings *contact) {
-  const struct calibration *calibration = own->calibration;
+void location_stage_set_force_scale(const struct location_stage *stage, const struct condition *condition, bool tared,
+                                    struct contact_settings *contact) {
+  const struct calibration *calibration = stage->calibration;
   contact->force_scale = calibration ? calibration->force_scale : DEFAULT_FORCE_SCALE;
   float sd = calibration ? calibration->force_scale_sd : DEFAULT_FORCE_SCALE_SD;
   if (calibration && calibration->ambient_kPa > 0 && tared) {

@@ -19,29 +19,29 @@ struct location_stage {
   struct fit_outlier_state outliers;               /* search for an outlier among the sensors, of the contact under way */
 };
 
-void location_stage_start(struct location_stage *own);
+void location_stage_start(struct location_stage *stage);
 
 /* past_sd_Pa_q10: of each sensor, as condition.h has it. */
-void location_stage_process(struct location_stage *own, const int32_t *past_sd_Pa_q10, struct findings *found);
+void location_stage_process(struct location_stage *stage, const int32_t *past_sd_Pa_q10, struct findings *found);
 
 /* Scales the force. */
-void location_stage_weigh(const struct contact_settings *contact, struct findings *found);
+void location_stage_set_force(const struct contact_settings *contact, struct findings *found);
 
 /* Fills in what this stage knows of a contact packet. */
-void location_stage_put(const struct findings *found, struct wire_contact *packet);
+void location_stage_fill(const struct findings *found, struct wire_contact *packet);
 
 /* FT_ERR_ARGUMENT: out of the range of the command. */
-enum ft_status location_stage_set_prior(struct location_stage *own, float sigma_mm, float sd_mm);
-enum ft_status location_stage_set_limit(struct location_stage *own, float limit_mm);
+enum ft_status location_stage_set_prior(struct location_stage *stage, float sigma_mm, float sd_mm);
+enum ft_status location_stage_set_limit(struct location_stage *stage, float limit_mm);
 
 /* This calibration, which is valid and outlives the stage, is in use from the next frame on; NULL: none. */
-void location_stage_use_calibration(struct location_stage *own, const struct calibration *calibration);
+void location_stage_use_calibration(struct location_stage *stage, const struct calibration *calibration);
 
 /* Whether a pad's profile is in use. With one the prior and the dip limit of the calibration are left out: the
  * tangential estimate was judged without them, and it distinguishes a wide contact from a tangential force. */
-void location_stage_use_profile(struct location_stage *own, bool has_profile);
+void location_stage_use_profile(struct location_stage *stage, bool has_profile);
 
 /* Sets the force scale of the calibration in use. Its standard deviation grows with the difference between the air
  * pressure, which the zeros show, and that of the calibration. Some 20 us, once a second. */
-void location_stage_scale_force(const struct location_stage *own, const struct condition *condition, bool tared,
-                                struct contact_settings *contact);
+void location_stage_set_force_scale(const struct location_stage *stage, const struct condition *condition, bool tared,
+                                    struct contact_settings *contact);

@@ -5,13 +5,13 @@
 
 #include <string.h>
 
-void shapes_stage_start(struct shapes_stage *own, const struct fit_array *array, struct jobs *jobs) {
-  own->job.array = array;
-  own->begins = true;
-  jobs_set(jobs, JOB_SHAPES, shapes_estimate, &own->job);
+void shapes_stage_start(struct shapes_stage *stage, const struct fit_array *array, struct jobs *jobs) {
+  stage->job.array = array;
+  stage->begins = true;
+  jobs_set(jobs, JOB_SHAPES, shapes_estimate, &stage->job);
 }
 
-void shapes_stage_forget(struct shapes_stage *own) { own->begins = true; }
+void shapes_stage_forget(struct shapes_stage *stage) { stage->begins = true; }
 
 static void set_question(struct shapes_question *question, bool begins, const struct location_stage *location,
                          const struct tangential_settings *scales, const struct findings *found) {
@@ -24,45 +24,45 @@ static void set_question(struct shapes_question *question, bool begins, const st
   question->force_scale_sd = scales->force_scale_sd;
 }
 
-void shapes_stage_ask(struct shapes_stage *own, const struct location_stage *location, const struct tangential_settings *scales,
+void shapes_stage_ask(struct shapes_stage *stage, const struct location_stage *location, const struct tangential_settings *scales,
                       struct jobs *jobs, const struct findings *found) {
-  const bool asks = own->is_in_use && found->conditioned.contact;
-  if (!asks || own->starts != jobs->starts) {
-    own->begins = true;
-    own->starts = jobs->starts;
+  const bool asks = stage->is_in_use && found->conditioned.contact;
+  if (!asks || stage->starts != jobs->starts) {
+    stage->begins = true;
+    stage->starts = jobs->starts;
   }
-  if (own->begins) {
-    memset(&own->report, 0, sizeof own->report);
+  if (stage->begins) {
+    memset(&stage->report, 0, sizeof stage->report);
   }
   if (!asks || !jobs_is_free(jobs, JOB_SHAPES)) {
     return;
   }
-  if (own->begins) {
-    memset(&own->job.report, 0, sizeof own->job.report);
-    own->job.progress = FIT_SHAPES_STEPPED;
+  if (stage->begins) {
+    memset(&stage->job.report, 0, sizeof stage->job.report);
+    stage->job.progress = FIT_SHAPES_STEPPED;
   }
-  own->report = own->job.report;
-  if (own->job.progress == FIT_SHAPES_UNFINISHED) {
-    own->job.question.begins = false;
+  stage->report = stage->job.report;
+  if (stage->job.progress == FIT_SHAPES_UNFINISHED) {
+    stage->job.question.begins = false;
   } else {
-    set_question(&own->job.question, own->begins, location, scales, found);
+    set_question(&stage->job.question, stage->begins, location, scales, found);
   }
-  own->job.question.parts = shapes_parts(jobs->pace_us);
-  own->begins = false;
+  stage->job.question.parts = shapes_parts(jobs->short_interval_us);
+  stage->begins = false;
   worker_ask(&jobs->worker[JOB_SHAPES]);
   port_worker_wake();
 }
 
-void shapes_stage_judge_tangential(const struct shapes_stage *own, struct findings *found) {
-  if (own->report.shape == FIT_SHAPE_TWO) {
+void shapes_stage_judge_tangential(const struct shapes_stage *stage, struct findings *found) {
+  if (stage->report.shape == FIT_SHAPE_TWO) {
     found->tangential = NULL;
   }
 }
 
-void shapes_stage_locate(const struct shapes_stage *own, const struct location_stage *location, struct findings *found) {
+void shapes_stage_locate(const struct shapes_stage *stage, const struct location_stage *location, struct findings *found) {
   const bool has_force = (found->contact.flags & CONTACT_FLAG_TANGENTIAL_VALID) != 0;
-  found->contact.flags |= shapes_flags(&own->report);
-  found->location = shapes_locate(&own->report, &found->fit, has_force ? &found->tangential_force : NULL);
+  found->contact.flags |= shapes_flags(&stage->report);
+  found->location = shapes_locate(&stage->report, &found->fit, has_force ? &found->tangential_force : NULL);
   found->contact.flags &= ~(uint32_t)CONTACT_FLAG_UNCERTAIN;
   if (found->location.location_sd_mm > location->settings.location_sd_limit_mm) {
     found->contact.flags |= CONTACT_FLAG_UNCERTAIN;
@@ -70,8 +70,8 @@ void shapes_stage_locate(const struct shapes_stage *own, const struct location_s
 }
 
 /* A quantity that the shape does not have is zero. */
-void shapes_stage_put(const struct shapes_stage *own, const struct findings *found, struct wire_contact *packet) {
-  const struct shapes_report *report = &own->report;
+void shapes_stage_fill(const struct shapes_stage *stage, const struct findings *found, struct wire_contact *packet) {
+  const struct shapes_report *report = &stage->report;
   packet->x_mm = found->location.x_mm;
   packet->y_mm = found->location.y_mm;
   packet->location_sd_mm = found->location.location_sd_mm;
@@ -91,7 +91,7 @@ void shapes_stage_put(const struct shapes_stage *own, const struct findings *fou
   packet->edge_length_mm = report->edge_length_mm;
 }
 
-void shapes_stage_use_profile(struct shapes_stage *own, const struct pad_profile *profile) {
-  own->is_in_use = profile && fit_shapes_init(&own->job.pad, own->job.array, profile) == FT_OK;
-  shapes_stage_forget(own);
+void shapes_stage_use_profile(struct shapes_stage *stage, const struct pad_profile *profile) {
+  stage->is_in_use = profile && fit_shapes_init(&stage->job.pad, stage->job.array, profile) == FT_OK;
+  shapes_stage_forget(stage);
 }

@@ -20,23 +20,23 @@ struct shapes_stage {
 };
 
 /* array outlives the stage. */
-void shapes_stage_start(struct shapes_stage *own, const struct fit_array *array, struct jobs *jobs);
+void shapes_stage_start(struct shapes_stage *stage, const struct fit_array *array, struct jobs *jobs);
 
 /* After the tangential question: takes what is known of the shape, and asks for more. scales: the tangential stage's. */
-void shapes_stage_ask(struct shapes_stage *own, const struct location_stage *location, const struct tangential_settings *scales,
+void shapes_stage_ask(struct shapes_stage *stage, const struct location_stage *location, const struct tangential_settings *scales,
                       struct jobs *jobs, const struct findings *found);
 
 /* After the tangential answer: two contacts have no tangential force in common. */
-void shapes_stage_judge_tangential(const struct shapes_stage *own, struct findings *found);
+void shapes_stage_judge_tangential(const struct shapes_stage *stage, struct findings *found);
 
 /* After all others: sets the location to report, and adds flags. */
-void shapes_stage_locate(const struct shapes_stage *own, const struct location_stage *location, struct findings *found);
+void shapes_stage_locate(const struct shapes_stage *stage, const struct location_stage *location, struct findings *found);
 
 /* Fills in what this stage knows of a contact packet. */
-void shapes_stage_put(const struct shapes_stage *own, const struct findings *found, struct wire_contact *packet);
+void shapes_stage_fill(const struct shapes_stage *stage, const struct findings *found, struct wire_contact *packet);
 
 /* As tangential_stage_use_profile. */
-void shapes_stage_use_profile(struct shapes_stage *own, const struct pad_profile *profile);
+void shapes_stage_use_profile(struct shapes_stage *stage, const struct pad_profile *profile);
 
 /* jobs_cancel was called: the contact is forgotten. */
-void shapes_stage_forget(struct shapes_stage *own);
+void shapes_stage_forget(struct shapes_stage *stage);

@@ -34,7 +34,7 @@ static void begin(struct findings *found, enum crash_activity activity) {
   found->spent_us[found->activity] += now_us - found->since_us;
   found->since_us = now_us;
   found->activity = (uint8_t)activity;
-  port_at(activity);
+  port_set_activity(activity);
 }
 
 /* The list of stages, up to what the second processor is asked. */
@@ -57,15 +57,15 @@ static void fit_readings(struct stages *stages, struct findings *found) {
 static __attribute__((noinline)) void judge_fit(struct stages *stages, struct findings *found) {
   begin(found, CRASH_AT_CONTACT);
 #if FT_WITH_FIT
-  location_stage_weigh(&stages->contact_settings, found);
-  contact_stage_gather(found, stages->location.calibration != NULL);
+  location_stage_set_force(&stages->contact_settings, found);
+  contact_stage_collect(found, stages->location.calibration != NULL);
 #else
-  contact_stage_gather(found, false);
+  contact_stage_collect(found, false);
 #endif
 #if FT_WITH_SLIP
   contact_update(&stages->slip, &stages->contact_settings, &found->contact_input, &found->contact);
 #else
-  contact_judge(&found->contact_input, &found->contact);
+  contact_set_flags(&found->contact_input, &found->contact);
 #endif
 #if FT_WITH_TANGENTIAL
   begin(found, CRASH_AT_FIT);
@@ -75,7 +75,7 @@ static __attribute__((noinline)) void judge_fit(struct stages *stages, struct fi
   shapes_stage_judge_tangential(&stages->shapes, found);
 #endif
 #if FT_WITH_TANGENTIAL_BIAS
-  uncertainty_stage_process(&stages->doubt, &stages->location, found);
+  uncertainty_stage_process(&stages->uncertainty, &stages->location, found);
 #endif
 #if FT_WITH_TANGENTIAL
   begin(found, CRASH_AT_CONTACT);
@@ -92,7 +92,7 @@ void stages_process(struct stages *stages, struct findings *found, uint32_t take
   memset(found->spent_us, 0, sizeof found->spent_us);
   found->slept_us = 0;
   found->activity = CRASH_AT_CONDITION;
-  port_at(CRASH_AT_CONDITION);
+  port_set_activity(CRASH_AT_CONDITION);
   /* A frame may have come after taken_us was read. */
   found->since_us = found->taken_us = (int32_t)(taken_us - read_us) < 0 ? read_us : taken_us;
   if (found->frame.held) {
@@ -106,15 +106,15 @@ void stages_process(struct stages *stages, struct findings *found, uint32_t take
 }
 
 #if FT_WITH_FIT
-void stages_put_contact(const struct stages *stages, const struct findings *found, struct wire_contact *packet) {
+void stages_fill_contact(const struct stages *stages, const struct findings *found, struct wire_contact *packet) {
   (void)stages; /* only shapes are not in the findings */
-  contact_stage_put(found, packet);
-  location_stage_put(found, packet);
+  contact_stage_fill(found, packet);
+  location_stage_fill(found, packet);
 #if FT_WITH_TANGENTIAL
-  tangential_stage_put(found, packet);
+  tangential_stage_fill(found, packet);
 #endif
 #if FT_WITH_SHAPES
-  shapes_stage_put(&stages->shapes, found, packet);
+  shapes_stage_fill(&stages->shapes, found, packet);
 #endif
 }
 #endif
@@ -122,7 +122,7 @@ void stages_put_contact(const struct stages *stages, const struct findings *foun
 #if FT_WITH_RAW_STREAM
 static void send_raw(const struct stages *stages, const struct findings *found, struct line *line) {
   struct wire_raw *raw = &line->packet.body.raw;
-  condition_stage_put(&stages->condition, found, raw);
+  condition_stage_fill(&stages->condition, found, raw);
   line_send(line, &wire_raw_layout, found->frame.t_us);
 }
 #endif
@@ -130,7 +130,7 @@ static void send_raw(const struct stages *stages, const struct findings *found, 
 void stages_send(const struct stages *stages, const struct findings *found, uint8_t streams, struct line *line) {
 #if FT_WITH_FIT
   if (streams & WIRE_STREAM_CONTACT) {
-    stages_put_contact(stages, found, &line->packet.body.contact);
+    stages_fill_contact(stages, found, &line->packet.body.contact);
     line_send(line, &wire_contact_layout, found->frame.t_us);
   }
 #endif
@@ -141,32 +141,32 @@ void stages_send(const struct stages *stages, const struct findings *found, uint
 #endif
 }
 
-void stages_follow(struct stages *stages, const struct findings *found, struct scan *scan) {
+void stages_after_send(struct stages *stages, const struct findings *found, struct scan *scan) {
 #if FT_WITH_TANGENTIAL
-  port_at(CRASH_AT_FIT);
-  jobs_serve_alone(&stages->jobs, JOB_TANGENTIAL);
+  port_set_activity(CRASH_AT_FIT);
+  jobs_run_here(&stages->jobs, JOB_TANGENTIAL);
 #endif
 #if FT_WITH_SHAPES
-  jobs_serve_alone(&stages->jobs, JOB_SHAPES);
+  jobs_run_here(&stages->jobs, JOB_SHAPES);
 #endif
-  port_at(CRASH_AT_CONDITION);
+  port_set_activity(CRASH_AT_CONDITION);
   if (found->frame.held) {
     return;
   }
-  condition_stage_follow(&stages->condition, found);
+  condition_stage_after_send(&stages->condition, found);
 #if FT_WITH_FIT
   if (plausibility_follow(&stages->plausibility, &found->frame, &found->conditioned)) {
     readings_doubt(&scan->readings, stages->plausibility.apart);
   }
 #endif
 #if FT_WITH_TANGENTIAL_BIAS
-  uncertainty_stage_follow(&stages->doubt, &stages->location, found);
+  uncertainty_stage_after_send(&stages->uncertainty, &stages->location, found);
 #endif
 }
 
 void stages_each_second(struct stages *stages, const struct findings *found) {
 #if FT_WITH_FIT
-  location_stage_scale_force(&stages->location, &stages->condition.condition, found->conditioned.tared, &stages->contact_settings);
+  location_stage_set_force_scale(&stages->location, &stages->condition.condition, found->conditioned.tared, &stages->contact_settings);
 #endif
 #if FT_WITH_TANGENTIAL
   tangential_stage_use_scale(&stages->tangential, &stages->location, &stages->contact_settings);
@@ -175,7 +175,7 @@ void stages_each_second(struct stages *stages, const struct findings *found) {
 
 void stages_each_round(struct stages *stages, uint64_t now_us, uint8_t streams, struct line *line) {
 #if FT_WITH_SYNC
-  sync_follow(&stages->sync, now_us, streams != 0, line);
+  sync_send_edges(&stages->sync, now_us, streams != 0, line);
 #endif
 }
 
@@ -223,7 +223,7 @@ void stages_use_calibration(struct stages *stages, const struct findings *found,
   slip_reset(&stages->slip); /* other gains move the location */
 #endif
 #if FT_WITH_TANGENTIAL_BIAS
-  uncertainty_stage_forget_gains(&stages->doubt);
+  uncertainty_stage_forget_gains(&stages->uncertainty);
 #endif
   stages_each_second(stages, found); /* the force scale */
 }
@@ -272,7 +272,7 @@ void stages_use_settings(struct stages *stages, const struct store_settings *set
 #endif
 }
 
-void stages_keep_settings(const struct stages *stages, struct store_settings *settings) {
+void stages_get_settings(const struct stages *stages, struct store_settings *settings) {
 #if FT_WITH_SLIP
   settings->slip_threshold_mm = stages->contact_settings.slip_threshold_mm;
   settings->slip_window_ms = (uint16_t)(stages->contact_settings.slip_window_us / 1000u);
@@ -317,7 +317,7 @@ static enum ft_status store_profile(struct store *store, const struct pad_profil
 }
 #endif
 
-enum ft_status stages_obey(struct stages *stages, const struct wire_packet *command, struct store *store) {
+enum ft_status stages_execute(struct stages *stages, const struct wire_packet *command, struct store *store) {
   switch (command->type) {
 #if FT_WITH_SLIP
   case WIRE_CMD_SLIP: return set_slip(stages, command->body.cmd_slip.threshold_mm, command->body.cmd_slip.window_ms);
@@ -349,7 +349,7 @@ static uint32_t second_processor(const struct stages *stages) {
 #endif
 }
 
-void stages_put_info(const struct stages *stages, struct wire_info *info) {
+void stages_fill_info(const struct stages *stages, struct wire_info *info) {
   info->capabilities |= second_processor(stages);
 #if FT_WITH_FIT
   const struct location_stage *location = &stages->location;
@@ -377,7 +377,7 @@ void stages_put_info(const struct stages *stages, struct wire_info *info) {
 #endif
 }
 
-void stages_put_health(const struct stages *stages, struct wire_health *health) {
+void stages_fill_health(const struct stages *stages, struct wire_health *health) {
   health->capabilities |= second_processor(stages);
 #if FT_WITH_FIT
   health->fit_failures = stages->location.failures;

@@ -39,7 +39,7 @@ struct stages {
   struct slip_history slip;
 #endif
 #if FT_WITH_TANGENTIAL_BIAS
-  struct uncertainty_stage doubt;
+  struct uncertainty_stage uncertainty;
 #endif
 #if FT_WITH_SYNC
   struct sync sync;
@@ -56,17 +56,17 @@ struct stages {
 /* Sets what the scene starts with. Zero-initialise before. */
 void stages_start(struct stages *stages);
 
-/* The frame's way, from its readings to what its packets report. taken_us: when the frame was taken, modulo 2^32. */
+/* Takes a frame from its readings to what its packets report. taken_us: when the frame was taken, modulo 2^32. */
 void stages_process(struct stages *stages, struct findings *found, uint32_t taken_us);
 
-/* The packets that these streams ask for (enum wire_stream). */
+/* Sends the packets that these streams ask for (enum wire_stream). */
 void stages_send(const struct stages *stages, const struct findings *found, uint8_t streams, struct line *line);
 
 /* Fills in what the stages know of a contact packet. A scene without the fit has none. */
-void stages_put_contact(const struct stages *stages, const struct findings *found, struct wire_contact *packet);
+void stages_fill_contact(const struct stages *stages, const struct findings *found, struct wire_contact *packet);
 
-/* After the packets: what only the frames to come need. */
-void stages_follow(struct stages *stages, const struct findings *found, struct scan *scan);
+/* After the packets: updates what only later frames need. */
+void stages_after_send(struct stages *stages, const struct findings *found, struct scan *scan);
 
 /* Once a second. */
 void stages_each_second(struct stages *stages, const struct findings *found);
@@ -92,13 +92,13 @@ void stages_use_stored_pad(struct stages *stages, const struct findings *found, 
 
 /* Settings that are stored, and those that are to be. What this firmware refuses stays as it is. */
 void stages_use_settings(struct stages *stages, const struct store_settings *settings);
-void stages_keep_settings(const struct stages *stages, struct store_settings *settings);
+void stages_get_settings(const struct stages *stages, struct store_settings *settings);
 
 /* The set of commands that this scene knows, and the result of one of the stages: FT_OK; FT_PENDING: it is being
  * stored; FT_ERR_ARGUMENT: out of range; FT_ERR_BUSY; FT_ERR_TYPE: no command of the stages. */
 extern const struct wire_layout *const stages_commands[];
-enum ft_status stages_obey(struct stages *stages, const struct wire_packet *command, struct store *store);
+enum ft_status stages_execute(struct stages *stages, const struct wire_packet *command, struct store *store);
 
 /* Fills in what the stages know of these packets. */
-void stages_put_info(const struct stages *stages, struct wire_info *info);
-void stages_put_health(const struct stages *stages, struct wire_health *health);
+void stages_fill_info(const struct stages *stages, struct wire_info *info);
+void stages_fill_health(const struct stages *stages, struct wire_health *health);

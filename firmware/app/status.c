@@ -32,7 +32,7 @@ void status_send_info(struct app *app, uint64_t now_us) {
   port_serial_number(serial);
   copy_text(info->serial, serial);
   info->rate_mHz = app->commands.rate_mHz;
-  info->measured_rate_mHz = app->second.rate_mHz;
+  info->measured_rate_mHz = app->statistics.rate_mHz;
   info->osr = app->commands.osr;
   info->temperature_interval_ms = SCAN_TEMPERATURE_INTERVAL_ms;
   info->streams = app->commands.streams;
@@ -42,7 +42,7 @@ void status_send_info(struct app *app, uint64_t now_us) {
   info->stored |= app->store.content.has_settings ? (uint32_t)WIRE_STORED_SETTINGS : 0;
   info->stored |= store_is_writing(&app->store) ? (uint32_t)WIRE_STORED_WRITING : 0;
   info->stored |= app->store.damaged ? (uint32_t)WIRE_STORED_DAMAGED : 0;
-  stages_put_info(&app->stages, info);
+  stages_fill_info(&app->stages, info);
   line_send(&app->line, &wire_info_layout, now_us);
 }
 
@@ -53,7 +53,7 @@ void status_send_health(struct app *app, uint64_t now_us) {
   struct wire_health *health = &app->line.packet.body.health;
   *health = (struct wire_health){
       .capabilities = CAPABILITIES,
-      .uptime_s = app->second.uptime_s,
+      .uptime_s = app->statistics.uptime_s,
       .frames = scan_read(&counters->frames),
       .frames_incomplete = scan_read(&counters->frames_incomplete),
       .frames_skipped = scan_read(&counters->frames_skipped),
@@ -69,10 +69,10 @@ void status_send_health(struct app *app, uint64_t now_us) {
       .sensors_present = scan_read_map(&scan->present),
       .sensors_prom_bad = scan_read_map(&scan->prom_bad),
       .watchdog_resets = port_watchdog_resets(),
-      .cpu_busy_permille = app->second.busy_permille,
+      .cpu_busy_permille = app->statistics.busy_permille,
       .stack_free_bytes = stack_free < UINT16_MAX ? (uint16_t)stack_free : UINT16_MAX,
   };
-  stages_put_health(&app->stages, health);
+  stages_fill_health(&app->stages, health);
   line_send(&app->line, &wire_health_layout, now_us);
 }
 

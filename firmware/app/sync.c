@@ -28,7 +28,7 @@ static void send_edge(struct line *line, const struct port_sync_edge *edge) {
   line_send(line, &wire_sync_layout, edge->t_us);
 }
 
-void sync_follow(struct sync *sync, uint64_t now_us, bool streams, struct line *line) {
+void sync_send_edges(struct sync *sync, uint64_t now_us, bool streams, struct line *line) {
   if (!sync_is_stamping(sync) || now_us - sync->sampled_us < SAMPLE_us) {
     return;
   }

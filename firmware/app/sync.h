@@ -25,7 +25,7 @@ void sync_pause(struct sync *sync, bool paused);
 /* Each round, after the frame: sends the edges that came, if any stream is on. At most SYNC_EDGES_PER_ms, so that edges
  * that come too fast cannot delay the frames. */
 #define SYNC_EDGES_PER_ms 2
-void sync_follow(struct sync *sync, uint64_t now_us, bool streams, struct line *line);
+void sync_send_edges(struct sync *sync, uint64_t now_us, bool streams, struct line *line);
 
 /* The edges have to be taken each millisecond. */
 static inline bool sync_is_stamping(const struct sync *sync) {

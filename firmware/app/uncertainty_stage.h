@@ -15,10 +15,10 @@ struct uncertainty_stage {
   struct fit_gains gains; /* learnt while no calibration is in use */
 };
 
-void uncertainty_stage_process(const struct uncertainty_stage *own, const struct location_stage *location, struct findings *found);
+void uncertainty_stage_process(const struct uncertainty_stage *stage, const struct location_stage *location, struct findings *found);
 
 /* After the frame's packets, for the frames that follow: some parts of the search. */
-void uncertainty_stage_follow(struct uncertainty_stage *own, struct location_stage *location, const struct findings *found);
+void uncertainty_stage_after_send(struct uncertainty_stage *stage, struct location_stage *location, const struct findings *found);
 
 /* Another calibration is in use, or none: the gains are forgotten. */
-void uncertainty_stage_forget_gains(struct uncertainty_stage *own);
+void uncertainty_stage_forget_gains(struct uncertainty_stage *stage);

@@ -10,7 +10,7 @@ static bool shows_motion(const struct contact_input *input, uint32_t flags) {
          input->fit->location_noise_mm <= CONTACT_JITTER_MAX_mm;
 }
 
-struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit, float largest_Pa) {
+struct contact_force contact_scale_force(const struct contact_settings *settings, const struct fit_result *fit, float largest_Pa) {
   const bool is_known = !(fit->flags & CONTACT_FLAG_AT_BOUND) && fit->location_sd_mm <= fit->sigma_mm;
   const bool exceeds = !is_known && fit->p0_Pa > largest_Pa;
   const float force_N = exceeds ? fit->force_N * largest_Pa / fit->p0_Pa : fit->force_N;
@@ -26,7 +26,7 @@ bool contact_is_lower_bound(const struct fit_result *fit, sensor_map saturated) 
   return saturated && count_sensors(fit->used) < CONTACT_MIN_UNSATURATED;
 }
 
-void contact_judge(const struct contact_input *input, struct contact_result *result) {
+void contact_set_flags(const struct contact_input *input, struct contact_result *result) {
   uint32_t flags = input->fit ? input->fit->flags : 0;
   flags |= input->contact ? (uint32_t)CONTACT_FLAG_CONTACT : 0;
   flags |= input->tared ? (uint32_t)CONTACT_FLAG_TARED : 0;
@@ -64,7 +64,7 @@ static bool is_passed_over(struct slip_history *history, sensor_map used) {
 
 void contact_update(struct slip_history *history, const struct contact_settings *settings, const struct contact_input *input,
                     struct contact_result *result) {
-  contact_judge(input, result);
+  contact_set_flags(input, result);
   uint32_t flags = result->flags;
   if (!input->fit || !shows_motion(input, flags)) {
     slip_reset(history);

@@ -15,7 +15,7 @@ struct contact_settings {
   float force_scale_sd; /* standard deviation of force_scale */
 };
 
-/* What the fit does not know of its readings. */
+/* Input of the flags. */
 struct contact_input {
   uint64_t t_us; /* of the frame */
   bool contact;  /* the gate is open */
@@ -23,7 +23,7 @@ struct contact_input {
   bool masked;                             /* a sensor is missing or was left out */
   bool zero_doubtful;                      /* see condition.h */
   bool sensor_doubtful;                    /* a sensor in use is doubtful, see frame.h */
-  bool calibrated;                         /* gains and force scale of a calibration act */
+  bool calibrated;                         /* gains and force scale of a calibration are applied */
   sensor_map unsettled;                    /* bitmap, see frame.h */
   sensor_map saturated;                    /* bitmap: left out of the fit for being beyond their range */
   const struct fit_result *fit;            /* NULL where nothing was fitted */
@@ -44,15 +44,15 @@ struct contact_force {
 
 bool contact_is_lower_bound(const struct fit_result *fit, sensor_map saturated);
 
-/* The force of a fit, scaled; its standard deviation holds that of the scale. largest_Pa: reading, of any size where a
- * sensor is saturated. A fit at its bound, or whose middle is not known to within its width, may have any pressure
- * there: its force is at most what the largest reading makes of its width, and its standard deviation holds what is cut. */
-struct contact_force contact_weigh(const struct contact_settings *settings, const struct fit_result *fit, float largest_Pa);
+/* The scaled force of a fit, with the scale's error in its standard deviation. largest_Pa: reading, of any size where a sensor is
+ * saturated. A fit at its bound, or whose location is less certain than its width, may have any peak: its force is limited to that of the
+ * largest reading at its width, and the standard deviation contains what is cut. */
+struct contact_force contact_scale_force(const struct contact_settings *settings, const struct fit_result *fit, float largest_Pa);
 
-/* Without slip. */
-void contact_judge(const struct contact_input *input, struct contact_result *result);
+/* Sets the flags, without slip. */
+void contact_set_flags(const struct contact_input *input, struct contact_result *result);
 
-/* With slip. Locations flagged FLAT, AT_BOUND or ZERO_DOUBTFUL do not enter the slip history. Neither do those whose
+/* Sets the flags, with slip. Locations flagged FLAT, AT_BOUND or ZERO_DOUBTFUL do not enter the slip history. Neither do those whose
  * noise alone has a standard deviation above CONTACT_JITTER_MAX_mm. The history starts again after them, as after a
  * loss of contact. At that limit noise alone exceeds the usual threshold of 0.75 mm once in a million frames. Of other
  * settled sensors the first frame does not enter either, and a second starts again. Velocity starts again with the

@@ -126,15 +126,15 @@ static struct change change_of(const struct motion_history *history, const struc
 static int32_t squared_way(const struct change *change) { return change->x_um * change->x_um + change->y_um * change->y_um; }
 
 /* Squared way that is not to be believed; of a slide under way, a quarter of it. */
-static int32_t squared_doubt(const struct change *change, bool already) {
-  int32_t doubt = FLOOR_um * FLOOR_um + MOTION_NOISE_SDS * MOTION_NOISE_SDS * change->variance_um2;
-  return already ? doubt / 4 : doubt;
+static int32_t squared_allowance(const struct change *change, bool already) {
+  int32_t allowance = FLOOR_um * FLOOR_um + MOTION_NOISE_SDS * MOTION_NOISE_SDS * change->variance_um2;
+  return already ? allowance / 4 : allowance;
 }
 
 static bool slides(const struct change *change, const struct pair_spans *spans, int32_t crosstalk_q8, bool already) {
   int32_t way2 = squared_way(change);
   int32_t ratio2 = change->ratio_x_um * change->ratio_x_um + change->ratio_y_um * change->ratio_y_um;
-  if (way2 <= squared_doubt(change, already) + (ratio2 >> 8) * crosstalk_q8) {
+  if (way2 <= squared_allowance(change, already) + (ratio2 >> 8) * crosstalk_q8) {
     return false;
   }
   int32_t beyond = way2 - change->x_um * change->ratio_x_um - change->y_um * change->ratio_y_um; /* times way */
@@ -148,11 +148,11 @@ static bool slides_slowly(const struct motion_history *history, const struct cha
   }
   struct change slow = change_of(history, &history->slow, &SLOW);
   if (!slides(&slow, &SLOW, history->crosstalk_q8, history->sliding) ||
-      squared_way(&slow) >> CREEP_SHIFT > squared_way(brief) + squared_doubt(brief, false)) {
+      squared_way(&slow) >> CREEP_SHIFT > squared_way(brief) + squared_allowance(brief, false)) {
     return false;
   }
   struct change latest = change_of(history, &history->slow, &SLOW_LATEST);
-  return squared_way(&latest) > squared_doubt(&latest, true) &&
+  return squared_way(&latest) > squared_allowance(&latest, true) &&
          latest.x_um * slow.x_um + latest.y_um * slow.y_um > squared_way(&slow) / GOES_ON;
 }
 
@@ -286,8 +286,8 @@ static void judge(struct motion_history *history, uint64_t t_us) {
   history->velocity_valid = find_velocity(history);
   if (shows_slide(history)) {
     history->sliding = true;
-    history->slid_us = t_us;
-  } else if (history->sliding && t_us - history->slid_us > MOTION_SLIDING_ENDS_us) {
+    history->last_slide_us = t_us;
+  } else if (history->sliding && t_us - history->last_slide_us > MOTION_SLIDING_ENDS_us) {
     history->sliding = false;
     history->slow.count = 0; /* what rings after a slide is not to be compared with before it */
     history->slow_slides = false;

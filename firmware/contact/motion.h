@@ -54,7 +54,7 @@
 /* After a longer interval between two locations the history is dropped. */
 #define MOTION_PAUSE_us 125000u
 
-/* What all frames before one add up to. */
+/* Sums over all frames up to one. */
 struct motion_sums {
   uint32_t t_us;             /* of that frame */
   uint32_t count;            /* of frames */
@@ -91,11 +91,11 @@ struct motion_history {
   struct motion_moments moments; /* the same */
   struct motion_ratio ratio_x, ratio_y;
   uint64_t newest_us;
-  uint64_t judged_us, slid_us; /* when last; when a slide showed last */
-  struct motion motion;        /* as judged */
-  int32_t scale_q8;            /* of the tangential force, newest frame */
-  int32_t crosstalk_q8;        /* the same: see motion.c */
-  sensor_map used;             /* bitmap: sensors in use */
+  uint64_t judged_us, last_slide_us; /* when last; of the last slide */
+  struct motion motion;              /* as judged */
+  int32_t scale_q8;                  /* of the tangential force, newest frame */
+  int32_t crosstalk_q8;              /* the same: see motion.c */
+  sensor_map used;                   /* bitmap: sensors in use */
   bool velocity_valid, moving, sliding;
   bool stepped;                                         /* slow has an entry that is not judged yet */
   bool slow_slides;                                     /* at the newest that is */
@@ -103,7 +103,7 @@ struct motion_history {
   struct motion_moments moments_before[MOTION_ENTRIES]; /* beside brief.sums */
 };
 
-/* Forgets the past. */
+/* Forgets all frames. */
 void motion_reset(struct motion_history *history);
 
 /* After tangential_update, of the same input: enters the location and adds VELOCITY_VALID, MOVING and SLIDING to result->flags. */

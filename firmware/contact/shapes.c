@@ -11,7 +11,7 @@
 
 uint8_t shapes_parts(uint64_t apart_us) {
   const uint8_t most = FIT_SHAPES_FRAMES * FIT_SHAPES_PARTS;
-  const uint32_t load_us = apart_us < TANGENTIAL_SLOW_us ? TANGENTIAL_LATE_us : TANGENTIAL_SLOW_LATE_us;
+  const uint32_t load_us = apart_us < TANGENTIAL_SLOW_us ? TANGENTIAL_TIMEOUT_us : TANGENTIAL_SLOW_TIMEOUT_us;
   if (apart_us >= load_us + most * SHAPES_PART_us) {
     return most;
   }
@@ -56,7 +56,7 @@ static void put_report(const struct shapes_question *question, const struct fit_
   }
   if (result->shape == FIT_SHAPE_ROUND) {
     const float chi_square = fminf(result->chi_square[0], result->chi_square[1]);
-    report->doubt = fmaxf(chi_square / (float)FIT_SHAPES_ERRORS, 1.0f);
+    report->chi_square_ratio = fmaxf(chi_square / (float)FIT_SHAPES_ERRORS, 1.0f);
   }
   if (result->shape == FIT_SHAPE_TANGENTIAL || result->shape == FIT_SHAPE_ELONGATED) {
     report->from_fit_x_mm = result->x_mm[0] - question->fit.x_mm;
@@ -96,7 +96,7 @@ struct shapes_location shapes_locate(const struct shapes_report *report, const s
   }
   const bool is_pulled = report->shape == FIT_SHAPE_TANGENTIAL;
   if (report->shape == FIT_SHAPE_ROUND) {
-    place.location_sd_mm *= report->doubt;
+    place.location_sd_mm *= report->chi_square_ratio;
   } else if (report->shape == FIT_SHAPE_ELONGATED || (is_pulled && !force)) {
     const float dx_mm = fabsf(fit->x_mm + report->from_fit_x_mm - place.x_mm);
     const float dy_mm = fabsf(fit->y_mm + report->from_fit_y_mm - place.y_mm);

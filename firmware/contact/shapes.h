@@ -18,7 +18,7 @@ struct shapes_report {
   } contact[2];
   float edge_angle_deg, edge_angle_sd_deg; /* -90 to 90, from x towards y */
   float edge_length_mm;
-  float doubt;                        /* ROUND: chi^2 over FIT_SHAPES_ERRORS, at least 1 */
+  float chi_square_ratio;             /* ROUND: chi^2 over FIT_SHAPES_ERRORS, at least 1 */
   float from_fit_x_mm, from_fit_y_mm; /* pulled or long: the middle, from the Gaussian's place in
                                          the same frame */
 };

@@ -27,7 +27,7 @@ struct slip_history {
   int32_t x_16th_um[SLIP_CAPACITY], y_16th_um[SLIP_CAPACITY];
 };
 
-/* Forgets the past: call when contact is lost or the location cannot be trusted. */
+/* Forgets all locations. Call it when contact is lost or the location cannot be trusted. */
 void slip_reset(struct slip_history *history);
 
 /* Enters a location and gives its distance from the mean of those in the window before it. t_us must increase from call

@@ -13,8 +13,8 @@
 #define PLACES_Q26 13          /* (0.44 um)^2 in mm^2: half of the root of the mean square */
 #define ENDS_SQUARE_Q26 328833 /* 0.07 mm */
 
-void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile, const struct contact_settings *settings,
-                    int32_t off_um) {
+void tangential_configure(struct tangential_settings *tangential, const struct pad_profile *profile,
+                          const struct contact_settings *settings, int32_t off_um) {
   /* A calibration's scale was found with 2 pi p0 sigma^2, of which the estimate's force is no
    * part; without one the estimate is the force itself, and as uncertain. */
   const bool calibrated = off_um >= 0;
@@ -24,7 +24,7 @@ void tangential_use(struct tangential_settings *tangential, const struct pad_pro
   tangential->tangential_scale = profile->tangential_scale;
   tangential->tangential_scale_sd = profile->tangential_scale_sd;
   tangential->from_touch = profile->from_touch != 0;
-  off_um = calibrated ? off_um : TANGENTIAL_USUAL_OFF_um;
+  off_um = calibrated ? off_um : TANGENTIAL_DEFAULT_OFFSET_um;
   tangential->location_variance_q26 = off_um * off_um * PLACES_Q26 + (bytes_from_f32(profile->overhang_mm) != 0 ? ENDS_SQUARE_Q26 : 0);
   float edges[PAD_EDGE_KINDS][PAD_EDGE_TERMS];
   memcpy(edges, &profile->edges, sizeof edges);

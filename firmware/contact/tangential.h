@@ -19,12 +19,12 @@ struct tangential_settings {
   float location_sd_limit_mm;                        /* UNCERTAIN above it */
 };
 
-#define TANGENTIAL_USUAL_OFF_um 160 /* of others' arrays on boards: 0.1 to 0.23 mm each way */
+#define TANGENTIAL_DEFAULT_OFFSET_um 160 /* of others' arrays on boards: 0.1 to 0.23 mm each way */
 
 /* The scales of this profile, with the calibration whose scales are in settings. off_um: how far that has sensors off their places, mean of
  * |x| + |y|, at most 4000; -1: not calibrated. */
-void tangential_use(struct tangential_settings *tangential, const struct pad_profile *profile, const struct contact_settings *settings,
-                    int32_t off_um);
+void tangential_configure(struct tangential_settings *tangential, const struct pad_profile *profile,
+                          const struct contact_settings *settings, int32_t off_um);
 
 /* The tangential force at the beginning of a contact counts as zero: the mean of Q / F over this time after its
  * first estimate. Long enough for the mean of a hundred frames, short before any lift. */
@@ -83,12 +83,12 @@ struct tangential_job {
 
 /* Frames nearer to each other than this leave no time to wait for an answer. The one of the frame
  * before is taken, whose tangential force has changed little since. */
-#define TANGENTIAL_BESIDE_us 1500u
+#define TANGENTIAL_NO_WAIT_us 1500u
 
 /* A Cortex-M0+ at 125 MHz answers within 330 us, and within 1.6 ms after a slow frame
  * (fit_tangential.h). What takes longer than this is not waited for. */
-#define TANGENTIAL_LATE_us 450u
-#define TANGENTIAL_SLOW_LATE_us 2250u
+#define TANGENTIAL_TIMEOUT_us 450u
+#define TANGENTIAL_SLOW_TIMEOUT_us 2250u
 
 /* Answers the question of a struct tangential_job. Where the fit is not worthwhile there is no estimate, and the course starts again. */
 void tangential_estimate(void *job);
@@ -96,8 +96,8 @@ void tangential_estimate(void *job);
 /* Forgets the contact. */
 void tangential_reset(struct tangential_history *history);
 
-/* Call after contact_judge or contact_update, with the same input. Adds TANGENTIAL_VALID and TANGENTIAL_FROM_TOUCH to result->flags. With
- * the former, UNCERTAIN is about the corrected location, and ELONGATED about the estimate, which a tangential force does not make look
+/* Call after contact_set_flags or contact_update, with the same input. Adds TANGENTIAL_VALID and TANGENTIAL_FROM_TOUCH to result->flags.
+ * With the former, UNCERTAIN is about the corrected location, and ELONGATED about the estimate, which a tangential force does not make look
  * long. Where the pad's edges hide a tangential force such that it shows less than TANGENTIAL_GAIN_MIN of itself, there is none. */
 #define TANGENTIAL_GAIN_MIN 0.25f
 void tangential_update(struct tangential_history *history, const struct tangential_settings *settings, const struct contact_input *input,

@@ -35,11 +35,11 @@ void port_watchdog_feed(void);
  * again each PORT_PART_LIMIT_us. Its own context. Costs some 20 cycles. */
 enum port_part { PORT_PART_SCAN, PORT_PART_USB, PORT_PARTS };
 #define PORT_PART_LIMIT_us 400000u
-void port_alive(enum port_part part);
+void port_report_alive(enum port_part part);
 
 /* For the record of a crash: what the main loop is at, and what happened (common/crash.h for the details). Main context only. */
-void port_at(enum crash_activity activity);
-void port_event(enum crash_event event, uint8_t detail);
+void port_set_activity(enum crash_activity activity);
+void port_log_event(enum crash_event event, uint8_t detail);
 
 /* A second processor that shares the memory: from now on it calls serve(context) whenever it is woken, until that returns false. Whatever
  * it did before has ended. False: there is none, or it does not start. Takes some 20 us. It writes

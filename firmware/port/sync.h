@@ -24,7 +24,7 @@ struct port_sync_edge {
   uint32_t number; /* since the pin was set, from 1, modulo 2^32. An odd one rises */
 };
 
-/* The oldest edge that was not taken yet; false: there is none. It keeps PORT_SYNC_KEPT of them, and
+/* The oldest edge that was not taken yet; false: there is none. It keeps PORT_SYNC_CAPACITY of them, and
  * what is older has left a gap in the numbers. Some 300 cycles, however fast edges come. */
-#define PORT_SYNC_KEPT 48u
+#define PORT_SYNC_CAPACITY 48u
 bool port_sync_take(struct port_sync_edge *edge);

@@ -311,7 +311,7 @@ static uint32_t next_generation(uint32_t generation) { return generation == UINT
 struct sector {
   uint32_t generation; /* 0: no good record */
   uint8_t used;        /* slots, counted to the last one that is */
-  uint8_t sure_slot;   /* the last that is good and sealed; STORE_SLOTS: none */
+  uint8_t sealed_slot; /* the last that is good and sealed; STORE_SLOTS: none */
   bool is_final;       /* and marked so, and no slot is used behind it */
   bool lost;           /* behind the newest good record is one that was sealed */
   bool first_is_bad;   /* the first slot is used and not good */
@@ -319,7 +319,7 @@ struct sector {
 };
 
 static struct sector read_slots(struct store *store, unsigned number) {
-  struct sector sector = {.sure_slot = STORE_SLOTS};
+  struct sector sector = {.sealed_slot = STORE_SLOTS};
   for (unsigned i = 0; i < slots_of(store); i++) {
     const uint32_t address = slot_address(store, number, i);
     if (read_u32(address + BEGUN_AT) == ERASED) {
@@ -338,7 +338,7 @@ static struct sector read_slots(struct store *store, unsigned number) {
         store->generation = sector.generation;
         store->damaged = !take_record(store);
       }
-      sector.sure_slot = sealed ? (uint8_t)i : sector.sure_slot;
+      sector.sealed_slot = sealed ? (uint8_t)i : sector.sealed_slot;
     } else if (i == 0) {
       sector.first_is_bad = true;
     }
@@ -370,20 +370,20 @@ void store_init(struct store *store, uint8_t sensor_count) {
   const struct sector *current = &sectors[store->sector];
   const struct sector *other = &sectors[!store->sector];
   store->next_slot = current->used;
-  store->sure_slot = current->sure_slot;
-  store->sure_slot_bytes = current->is_earlier ? STORE_SHORT_SLOT_BYTES : store->slot_bytes;
-  store->other_is_quiet = !other->first_is_bad;
+  store->sealed_slot = current->sealed_slot;
+  store->sealed_slot_bytes = current->is_earlier ? STORE_SHORT_SLOT_BYTES : store->slot_bytes;
+  store->other_is_stale = !other->first_is_bad;
   if (current->generation == 0) {
     /* The first record of all was cut short, and perhaps what was to settle that. */
     store->damaged = current->lost || other->lost;
-    store->must_settle = !store->damaged && current->used > 0 && current->used < slots_of(store) && other->used == 0;
+    store->must_rewrite = !store->damaged && current->used > 0 && current->used < slots_of(store) && other->used == 0;
     return;
   }
   if (current->lost) {
     store->damaged = true;
     memset(&store->content, 0, sizeof store->content);
   }
-  store->must_settle = !store->damaged && (!current->is_final || other->first_is_bad);
+  store->must_rewrite = !store->damaged && (!current->is_final || other->first_is_bad);
 }
 
 /* Writing ------------------------------------------------------------------------------------ */
@@ -418,18 +418,19 @@ static void begin_write(struct store *store, uint64_t now_us) {
   store->to_sector = store->sector;
   store->to_slot = store->next_slot;
   store->to_generation = store->generation;
-  bool fits = store->generation != 0 && store->next_slot < slots_of(store) && store->other_is_quiet;
+  bool fits = store->generation != 0 && store->next_slot < slots_of(store) && store->other_is_stale;
   if (fits) {
     store->next_slot++;
     begin_slot(store, now_us);
-  } else if (store->sure_slot < STORE_SLOTS) {
+  } else if (store->sealed_slot < STORE_SLOTS) {
     /* The seal of what remains may have been cut short itself: made good before the other goes. */
-    port_flash_program(store->sector * PORT_FLASH_SECTOR_BYTES + (store->sure_slot + 1u) * store->sure_slot_bytes - 8, mark, sizeof mark);
+    port_flash_program(store->sector * PORT_FLASH_SECTOR_BYTES + (store->sealed_slot + 1u) * store->sealed_slot_bytes - 8, mark,
+                       sizeof mark);
     begin_step(store, STORE_SECURE, now_us);
     store->to_sector = !store->sector;
     store->to_slot = 0;
     store->to_generation = next_generation(store->generation);
-    store->other_is_quiet = false;
+    store->other_is_stale = false;
   } else { /* all of this sector was cut short: what surely stays, if anything, is in the other */
     store->next_slot = STORE_SLOTS;
     store->to_slot = 0;
@@ -441,7 +442,7 @@ static void begin_write(struct store *store, uint64_t now_us) {
 
 static enum ft_status fail(struct store *store, enum ft_status why) {
   store->step = STORE_IDLE;
-  store->must_settle = false;
+  store->must_rewrite = false;
   return why;
 }
 
@@ -459,11 +460,11 @@ static enum ft_status finish_write(struct store *store) {
   store->sector = store->to_sector;
   store->next_slot = store->to_slot + 1;
   store->generation = store->to_generation;
-  store->sure_slot = store->to_slot;
-  store->sure_slot_bytes = store->slot_bytes;
-  store->other_is_quiet = true;
+  store->sealed_slot = store->to_slot;
+  store->sealed_slot_bytes = store->slot_bytes;
+  store->other_is_stale = true;
   store->damaged = false;
-  store->must_settle = false;
+  store->must_rewrite = false;
   store->step = STORE_IDLE;
   take_record(store);
   return FT_OK;
@@ -490,13 +491,13 @@ static struct parts kept_parts(const struct store *store) {
 static void put(struct store *store, const struct parts *parts) {
   store->attempts = 0;
   make_record(store, parts);
-  store->step = STORE_PUT;
+  store->step = STORE_REQUESTED;
   store->step_ends_us = 0;
 }
 
 enum ft_status store_poll(struct store *store, uint64_t now_us) {
   if (store->step == STORE_IDLE) {
-    if (!store->must_settle) {
+    if (!store->must_rewrite) {
       return FT_OK;
     }
     const struct parts parts = kept_parts(store);
@@ -506,7 +507,7 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
     return now_us < store->step_ends_us ? FT_PENDING : fail(store, FT_ERR_TIMEOUT);
   }
   switch (store->step) {
-  case STORE_PUT: begin_write(store, now_us); break;
+  case STORE_REQUESTED: begin_write(store, now_us); break;
   case STORE_SECURE: begin_erase(store, now_us); break;
   case STORE_ERASE: begin_slot(store, now_us); break;
   case STORE_BEGIN:
@@ -543,14 +544,14 @@ enum ft_status store_poll(struct store *store, uint64_t now_us) {
 }
 
 /* has: there is something of this part now. */
-static enum ft_status change(struct store *store, const struct parts *parts, bool puts, bool has, bool of_pad) {
+static enum ft_status change(struct store *store, const struct parts *parts, bool puts, bool has, bool pad_changes) {
   if (store_is_writing(store)) {
     return FT_ERR_BUSY;
   }
   if (!puts && !has && !store->damaged) {
     return FT_OK;
   }
-  store->of_pad = of_pad;
+  store->pad_changes = pad_changes;
   put(store, parts);
   return FT_PENDING;
 }

@@ -1,4 +1,4 @@
-/* What a fingertip keeps without power: a calibration, the pad's profile, and settings to start with. If the power
+/* Non-volatile storage: a calibration, the pad's profile, and settings to start with. If the power
  * fails at any moment, the old or the new content remains, never a mixture and never nothing.
  *
  * The flash is a log. A sector holds eight slots of 512 bytes, or four of 1024 if the array has 19 sensors or more. A
@@ -52,12 +52,12 @@ struct store_settings {
   uint32_t sync; /* enum port_sync; judged by who uses it */
 };
 
-/* What is in the flash for good. */
+/* Content of the flash. */
 struct store_content {
   bool has_calibration, has_settings, has_profile;
   struct calibration calibration;
   struct store_settings settings;
-  struct pad_profile profile; /* kept by every firmware, judged by who uses it */
+  struct pad_profile profile; /* every firmware stores it; its user checks it */
 };
 
 enum {
@@ -70,8 +70,8 @@ enum {
 
 enum store_step {
   STORE_IDLE,
-  STORE_PUT,    /* to be begun */
-  STORE_SECURE, /* the seal of what remains while the other sector is erased */
+  STORE_REQUESTED, /* to be begun */
+  STORE_SECURE,    /* the seal of what remains while the other sector is erased */
   STORE_ERASE,
   STORE_BEGIN, /* the mark that the slot is used */
   STORE_WRITE,
@@ -89,10 +89,10 @@ struct store {
   /* The log. The current sector holds the newest record, if there is any. */
   uint8_t sector;
   uint8_t next_slot;   /* of the current sector; none that there is: it is full */
-  uint8_t sure_slot;   /* of the current sector: a sealed record; STORE_SLOTS: none */
-  bool other_is_quiet; /* the other sector holds nothing that may turn into a newer record */
-  bool must_settle;    /* what was decided at start-up has to be written once more */
-  uint16_t sure_slot_bytes;
+  uint8_t sealed_slot; /* of the current sector: a sealed record; STORE_SLOTS: none */
+  bool other_is_stale; /* the other sector holds nothing that may turn into a newer record */
+  bool must_rewrite;   /* what was decided at start-up has to be written once more */
+  uint16_t sealed_slot_bytes;
   uint32_t generation; /* of the current sector; 0: there is no record */
 
   /* The write under way. */
@@ -101,7 +101,7 @@ struct store {
   uint16_t record_length;
   uint32_t to_generation;
   uint64_t step_ends_us;
-  bool of_pad; /* calibration or profile changes */
+  bool pad_changes; /* calibration or profile changes */
 
   bool damaged; /* what the flash holds is damaged, or of a later firmware: .content is empty */
   struct store_content content;
@@ -122,4 +122,4 @@ enum ft_status store_put_profile(struct store *store, const struct pad_profile *
  * FT_PENDING, once: FT_ERR_TIMEOUT, FT_ERR_CRC: the flash has failed, and .content is as before. */
 enum ft_status store_poll(struct store *store, uint64_t now_us);
 
-static inline bool store_is_writing(const struct store *store) { return store->step != STORE_IDLE || store->must_settle; }
+static inline bool store_is_writing(const struct store *store) { return store->step != STORE_IDLE || store->must_rewrite; }

@@ -187,7 +187,7 @@ void cdc_on_received(uint8_t endpoint, const uint8_t *bytes, size_t length) {
 }
 
 void cdc_on_service(void) {
-  port_alive(PORT_PART_USB);
+  port_report_alive(PORT_PART_USB);
   transmit();
   accept_packet();
 }
@@ -201,7 +201,7 @@ bool cdc_is_open(void) { return atomic_load_explicit(&is_open, memory_order_acqu
 
 bool cdc_is_suspended(void) { return atomic_load_explicit(&is_suspended, memory_order_relaxed) != 0; }
 
-uint32_t cdc_news(void) { return atomic_load_explicit(&news, memory_order_acquire); }
+uint32_t cdc_event_count(void) { return atomic_load_explicit(&news, memory_order_acquire); }
 
 uint32_t cdc_close_count(void) { return atomic_load_explicit(&close_count, memory_order_acquire); }
 

@@ -31,9 +31,8 @@ bool cdc_is_open(void);
 /* The bus is suspended: what hangs on it may draw 2.5 mA (USB 2.0, 7.2.3). */
 bool cdc_is_suspended(void);
 
-/* Changes when there is something to read, the port was closed, the bus falls asleep or wakes up,
- * or the host asked for the loader. A main loop that has handled all that need not look before. */
-uint32_t cdc_news(void);
+/* Counts what the main loop has to handle: bytes to read, the port closed, the bus suspended or resumed, the loader requested. */
+uint32_t cdc_event_count(void);
 
 /* Counts the times the port was closed (DTR dropped, suspended, bus reset, unplugged): streams end
  * then, and a host that comes back must ask for them again. */

@@ -18,7 +18,7 @@ from elf import Elf, fail
 OWNED = {
     "FIT": (
         ["ft_fit.dir/fit/*.obj", "ft_app.dir/app/location_stage.c.obj"],
-        r"wire_contact_\w+|contact_weigh|cmd_(calibrate|prior|location_limit)_\w+",
+        r"wire_contact_\w+|contact_scale_force|cmd_(calibrate|prior|location_limit)_\w+",
     ),
     "SLIP": (["ft_contact.dir/contact/slip.c.obj"], r"contact_update|cmd_slip_\w+"),
     "FULL_GRID": (["ft_fit.dir/fit/fit_grid.c.obj"], r"fit_grid"),

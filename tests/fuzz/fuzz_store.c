@@ -22,7 +22,7 @@ static void check_content(void) {
   FUZZ_CHECK(content.has_calibration || memcmp(&content.calibration, &none.calibration, sizeof none.calibration) == 0);
   FUZZ_CHECK(content.has_settings || memcmp(&content.settings, &none.settings, sizeof none.settings) == 0);
   FUZZ_CHECK(content.has_profile || memcmp(&content.profile, &none.profile, PROFILE_BYTES) == 0);
-  FUZZ_CHECK(store.next_slot <= STORE_SLOTS && store.sure_slot <= STORE_SLOTS && store.sector < PORT_FLASH_SECTORS);
+  FUZZ_CHECK(store.next_slot <= STORE_SLOTS && store.sealed_slot <= STORE_SLOTS && store.sector < PORT_FLASH_SECTORS);
 }
 
 /* Until nothing is under way, or power is lost. */

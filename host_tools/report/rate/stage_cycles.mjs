@@ -26,7 +26,7 @@ const STAGES = {
   fit_gaussian_grid_plain: 'fit',
   fit_gaussian_grid_small: 'fit',
   contact_update: 'contact',
-  contact_judge: 'contact',
+  contact_set_flags: 'contact',
   wire_encode: 'encode',
   cdc_write: 'queue',
   cdc_read: 'commands',

@@ -45,8 +45,8 @@ void native_stages_frame(struct native_stages *all, uint64_t t_us, const int32_t
   memset(packet, 0, sizeof *packet);
   packet->type = WIRE_CONTACT;
   packet->t_us = t_us;
-  stages_put_contact(&all->stages, &all->found, &packet->body.contact);
-  stages_follow(&all->stages, &all->found, &all->scan);
+  stages_fill_contact(&all->stages, &all->found, &packet->body.contact);
+  stages_after_send(&all->stages, &all->found, &all->scan);
   if (t_us >= all->second_us + 1000000u) {
     all->second_us = t_us;
     stages_each_second(&all->stages, &all->found);

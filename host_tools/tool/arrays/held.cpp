@@ -35,7 +35,7 @@ static published published_of(const pad_profile &profile, double force_scale, do
   scales.force_scale = static_cast<float>(scale);
   scales.force_scale_sd = static_cast<float>(force_scale_sd);
   tangential_settings settings{};
-  tangential_use(&settings, &profile, &scales, force_scale > 0.0 ? TANGENTIAL_USUAL_OFF_um : -1);
+  tangential_configure(&settings, &profile, &scales, force_scale > 0.0 ? TANGENTIAL_DEFAULT_OFFSET_um : -1);
   contact_input input{};
   input.contact = true;
   input.fit = &fit;
@@ -83,7 +83,7 @@ static void weigh(double force_scale, double force_scale_sd, Batch<const fit_res
   scales.force_scale = static_cast<float>(force_scale);
   scales.force_scale_sd = static_cast<float>(force_scale_sd);
   for (std::size_t i = 0; i < found.size(); i++) {
-    const contact_force force = contact_weigh(&scales, &fits[i], static_cast<float>(largest_Pa[i]));
+    const contact_force force = contact_scale_force(&scales, &fits[i], static_cast<float>(largest_Pa[i]));
     found.row(i)[0] = static_cast<double>(force.force_N);
     found.row(i)[1] = static_cast<double>(force.force_sd_N);
   }

@@ -268,7 +268,7 @@ TEST(a_second_processor_gives_the_same_answers) {
   const struct pad_profile profile = pad_of_12_mm();
   for (int pulled = 0; pulled < 2; pulled++) {
     unsigned counts[2];
-    const uint32_t takes_us = TANGENTIAL_LATE_us / (pulled ? 2 : 4);
+    const uint32_t takes_us = TANGENTIAL_TIMEOUT_us / (pulled ? 2 : 4);
     for (int processors = 1; processors <= 2; processors++) {
       tearDown();
       native_set_worker(processors == 2, takes_us);

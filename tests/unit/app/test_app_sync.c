@@ -77,7 +77,7 @@ TEST(a_storm_is_sent_at_a_bounded_rate) {
     }
     run_for(1);
   }
-  run_for(PORT_SYNC_KEPT);
+  run_for(PORT_SYNC_CAPACITY);
   struct wire_packet packet;
   uint32_t sent = 0, last = 0;
   while (next_packet(&packet)) {
@@ -89,7 +89,7 @@ TEST(a_storm_is_sent_at_a_bounded_rate) {
     }
   }
   TEST_ASSERT_EQUAL_UINT32(100 * 200, last);
-  TEST_ASSERT_UINT32_WITHIN(20, 100 * SYNC_EDGES_PER_ms + PORT_SYNC_KEPT, sent);
+  TEST_ASSERT_UINT32_WITHIN(20, 100 * SYNC_EDGES_PER_ms + PORT_SYNC_CAPACITY, sent);
 }
 
 TEST(a_pulse_is_a_frame) {

@@ -81,7 +81,7 @@ TEST(a_profile_tells_the_load_and_corrects_the_location) {
   TEST_ASSERT_TRUE(app.found.fit.y_mm < -4.0f - 0.4f);
   TEST_ASSERT_TRUE(contact.q_sd_N > 0.0f && contact.location_sd_mm > 0.0f);
   TEST_ASSERT_TRUE(app.found.fit.location_sd_mm < FIT_BIAS_ASSUMED_RATIO * 0.38f * 9.0f);
-  TEST_ASSERT_FALSE(app.stages.doubt.force.known);
+  TEST_ASSERT_FALSE(app.stages.uncertainty.force.known);
   TEST_ASSERT_EQUAL_FLOAT(app.found.fit.p0_Pa, contact.p0_Pa);
   TEST_ASSERT_EQUAL_FLOAT(app.found.fit.sigma_mm, contact.sigma_mm);
 }
@@ -276,7 +276,7 @@ static void feed_fast(double share) {
     return;
   }
   app.found.frame.number++;
-  app.found.frame.t_us += TANGENTIAL_BESIDE_us / 2;
+  app.found.frame.t_us += TANGENTIAL_NO_WAIT_us / 2;
   for (unsigned k = 0; k < geometry.sensor_count; k++) {
     const double zero = app.stages.condition.condition.zero_Pa_q10[k];
     app.found.frame.pressure_Pa_q10[k] = (int32_t)lround(zero + share * (first.pressure_Pa_q10[k] - zero));

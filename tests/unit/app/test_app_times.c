@@ -40,10 +40,10 @@ static void count_on(uint32_t count) {
   app.line.sequence = (uint16_t)count;
   app.line.sent = count;
   app.commands.done = count;
-  app.second.uptime_s = count;
+  app.statistics.uptime_s = count;
   atomic_store(&app.scan.counters.frames, count);
   atomic_store(&app.scan.counters.bus_nacks, count);
-  app.second.frames = count;
+  app.statistics.frames = count;
 }
 
 /* As if all had begun at 0. */

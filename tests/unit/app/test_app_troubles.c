@@ -179,7 +179,7 @@ TEST(test_stages_end_at_what_fits) {
   for (unsigned i = 0; i < 5; i++) {
     struct wire_contact contact;
     app.found.spent_us[CRASH_AT_FIT] = spent_us[i];
-    contact_stage_put(&app.found, &contact);
+    contact_stage_fill(&app.found, &contact);
     TEST_ASSERT_EQUAL_UINT16(i < 2 ? spent_us[i] : 65535, contact.stages.fit_us);
   }
 }

@@ -59,21 +59,21 @@ TEST(test_the_force_is_scaled_and_its_uncertainty_holds_that_of_the_scale) {
   const struct contact_settings scaled = {.force_scale = 1.25f, .force_scale_sd = 0.03f};
   fit.force_N = 4.0f;
   fit.force_sd_N = 0.128f; /* times 1.25 0.16; 0.03 of 4 N is 0.12 */
-  struct contact_force force = contact_weigh(&scaled, &fit, 1000.0f);
+  struct contact_force force = contact_scale_force(&scaled, &fit, 1000.0f);
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, 5.0f, force.force_N);
   TEST_ASSERT_FLOAT_WITHIN(0.001f * 0.2f, 0.2f, force.force_sd_N);
   fit.p0_Pa = 8000.0f; /* beyond the array */
-  TEST_ASSERT_EQUAL_FLOAT(5.0f, contact_weigh(&scaled, &fit, 1000.0f).force_N);
+  TEST_ASSERT_EQUAL_FLOAT(5.0f, contact_scale_force(&scaled, &fit, 1000.0f).force_N);
   fit.flags |= CONTACT_FLAG_AT_BOUND;
-  force = contact_weigh(&scaled, &fit, 1000.0f);
+  force = contact_scale_force(&scaled, &fit, 1000.0f);
   TEST_ASSERT_EQUAL_FLOAT(0.625f, force.force_N);
   TEST_ASSERT_FLOAT_WITHIN(0.01f, 1.25f * 3.5f, force.force_sd_N);
-  TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.2f, contact_weigh(&scaled, &fit, 7920.0f).force_sd_N); /* 1 % is cut */
+  TEST_ASSERT_FLOAT_WITHIN(0.01f, 0.2f, contact_scale_force(&scaled, &fit, 7920.0f).force_sd_N); /* 1 % is cut */
   fit.flags &= ~(uint32_t)CONTACT_FLAG_AT_BOUND;
   fit.location_sd_mm = 1.1f * fit.sigma_mm;
-  TEST_ASSERT_EQUAL_FLOAT(0.625f, contact_weigh(&scaled, &fit, 1000.0f).force_N);
+  TEST_ASSERT_EQUAL_FLOAT(0.625f, contact_scale_force(&scaled, &fit, 1000.0f).force_N);
   fit.flags &= ~(uint32_t)CONTACT_FLAG_UNCERTAINTY_VALID;
-  TEST_ASSERT_EQUAL_FLOAT(0.0f, contact_weigh(&scaled, &fit, 1000.0f).force_sd_N);
+  TEST_ASSERT_EQUAL_FLOAT(0.0f, contact_scale_force(&scaled, &fit, 1000.0f).force_sd_N);
 }
 
 TEST(test_slip_flag_and_threshold) {

@@ -49,7 +49,7 @@ static void draw_settings(void) {
   memset(&profile, 0, sizeof profile);
   profile.tangential_scale = between(0.5f, 2.0f);
   profile.tangential_scale_sd = between(0.0f, 0.2f);
-  tangential_use(&tangential_settings, &profile, &settings, ONE_IN(2) ? 113 : -1);
+  tangential_configure(&tangential_settings, &profile, &settings, ONE_IN(2) ? 113 : -1);
   for (int kind = 0; kind < PAD_EDGE_KINDS && ONE_IN(2); kind++) {
     for (int term = 0; term < PAD_EDGE_TERMS; term++) {
       tangential_settings.edges_q20[kind][term] = draw_between(-200000, 200000);
@@ -134,7 +134,7 @@ static uint32_t judge(uint32_t crc) {
   contact_update(&slip_history, &settings, &input, &told.result);
   tangential_update(&tangential_history, &tangential_settings, &input, &told.result, &told.load);
   motion_update(&motion_history, &tangential_settings, &input, &told.result, &told.motion);
-  told.force = contact_weigh(&settings, &fit, 1e9f);
+  told.force = contact_scale_force(&settings, &fit, 1e9f);
   return crc32_iso_hdlc((const uint8_t *)&told, sizeof told);
 }
 

@@ -68,9 +68,9 @@ TEST(what_the_load_and_a_long_shape_differ_by_is_part_of_the_error) {
 
 TEST(what_a_round_shape_leaves_is_doubt) {
   report.shape = FIT_SHAPE_ROUND;
-  report.doubt = 1.0f;
+  report.chi_square_ratio = 1.0f;
   is_at(2.0f, -5.0f, 0.3f, NULL);
-  report.doubt = 2.5f;
+  report.chi_square_ratio = 2.5f;
   is_at(2.0f, -5.0f, 0.75f, NULL);
   is_at(4.0f, -8.0f, 1.0f, &load);
 }

@@ -164,7 +164,7 @@ static void use_edges(const struct pad_edges *edges) {
   pad.edges = *edges;
   pad.tangential_scale = 1.0f;
   pad.tangential_scale_sd = 0.0f;
-  tangential_use(&settings, &pad, &(struct contact_settings){.force_scale = 1.0f}, -1);
+  tangential_configure(&settings, &pad, &(struct contact_settings){.force_scale = 1.0f}, -1);
 }
 
 /* At u = 0.25, v = -0.75: u^2 = 0.0625, v^2 = 0.5625. */
@@ -223,7 +223,7 @@ TEST(a_calibration_scales_what_its_force_scale_was_found_with) {
   pad.tangential_scale = 1.5f;
   pad.from_touch = 1;
   const struct contact_settings scales = {.force_scale = 1.25f, .force_scale_sd = 0.04f};
-  tangential_use(&settings, &pad, &scales, 160);
+  tangential_configure(&settings, &pad, &scales, 160);
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, 1.25f * 0.9375f, settings.force_scale);
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.04f * 0.9375f, settings.force_scale_sd);
   TEST_ASSERT_EQUAL_FLOAT(1.5f, settings.tangential_scale);
@@ -231,7 +231,7 @@ TEST(a_calibration_scales_what_its_force_scale_was_found_with) {
   TEST_ASSERT_TRUE(settings.from_touch);
   TEST_ASSERT_EQUAL_FLOAT(0.6f, settings.location_sd_limit_mm);
   pad.from_touch = 0;
-  tangential_use(&settings, &pad, &scales, -1);
+  tangential_configure(&settings, &pad, &scales, -1);
   TEST_ASSERT_EQUAL_FLOAT(1.0f, settings.force_scale);
   TEST_ASSERT_EQUAL_FLOAT(0.04f, settings.force_scale_sd);
   TEST_ASSERT_FALSE(settings.from_touch);
@@ -240,7 +240,7 @@ TEST(a_calibration_scales_what_its_force_scale_was_found_with) {
 static float place_sd_mm(float overhang_mm, int32_t off_um) {
   struct pad_profile pad = pad_of_12_mm();
   pad.overhang_mm = overhang_mm;
-  tangential_use(&settings, &pad, &(struct contact_settings){.force_scale = 1.0f}, off_um);
+  tangential_configure(&settings, &pad, &(struct contact_settings){.force_scale = 1.0f}, off_um);
   return sqrtf((float)settings.location_variance_q26 / 67108864.0f);
 }
 

@@ -327,7 +327,7 @@ static void draw_pad(void) {
     profile.spread_mm2 = (float)any(0, 100);
     profile.spread_sd_mm2 = (float)exp(any(log(0.11), log(99)));
     profile.from_touch = (uint8_t)below(2);
-    tangential_use(&tip.scales, &profile, &(struct contact_settings){0.75f, 0, (float)any(0.1, 10), 1.0f}, (int32_t)below(4002) - 1);
+    tangential_configure(&tip.scales, &profile, &(struct contact_settings){0.75f, 0, (float)any(0.1, 10), 1.0f}, (int32_t)below(4002) - 1);
   } while (fit_pad_init(&tip.tangential.pad, tip.tangential.array, &profile) != FT_OK ||
            fit_shapes_init(&tip.shapes.pad, tip.tangential.array, &profile) != FT_OK);
   tip.rubber.profile = profile;
@@ -428,7 +428,7 @@ static void fit_any(uint32_t number, const struct input *input, bool begins) {
   contact_update(&tip.slip, &scales, &of_frame, &result);
   tangential_update(&tip.history, &tip.scales, &of_frame, &result, &force);
   motion_update(&tip.motion, &tip.scales, &of_frame, &result, &motion);
-  const struct contact_force weighed = contact_weigh(&scales, &fit, 1e9f);
+  const struct contact_force weighed = contact_scale_force(&scales, &fit, 1e9f);
   const struct shapes_location place =
       shapes_locate(&tip.shapes.report, &fit, result.flags & CONTACT_FLAG_TANGENTIAL_VALID ? &force : NULL);
   fit_bias_step(&tip.bias, input->array, readings, settings, &fit);

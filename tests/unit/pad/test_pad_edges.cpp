@@ -70,7 +70,7 @@ static Told told(const pad_profile &pad, const twin::BlockTable &ends, double x_
   contact_settings weighing{};
   tangential_settings settings{};
   settings.location_sd_limit_mm = 0.6F;
-  tangential_use(&settings, &pad, &weighing, -1);
+  tangential_configure(&settings, &pad, &weighing, -1);
   tangential_history history{};
   contact_input input{};
   input.contact = true;

@@ -57,7 +57,7 @@ void usb_controller_request_service(void) {
     fake_run_interrupts();
 }
 
-void port_alive(enum port_part part) {
+void port_report_alive(enum port_part part) {
   TEST_ASSERT_EQUAL(PORT_PART_USB, part);
   TEST_ASSERT_TRUE(fake.in_interrupt);
   fake.signs_of_life++;

@@ -1,4 +1,4 @@
-#include "rp2040/guard.h"
+#include "rp2040/mpu.h"
 
 #include "rp2040/reg.h"
 
@@ -17,7 +17,7 @@
 #define MPU_RASR_ENABLE (1u << 0)
 
 /* From the start of SRAM. Each region covers eighths of its size, and the next one, of the size of an eighth, what is left. */
-static void guard_writes(uint32_t end) {
+static void protect_writes(uint32_t end) {
   extern const uint32_t __image_start[];
   uint32_t at = (uint32_t)(uintptr_t)__image_start;
   uint32_t region = 2;
@@ -30,17 +30,17 @@ static void guard_writes(uint32_t end) {
   }
 }
 
-void guard_end(void) {
+void mpu_disable(void) {
   MPU_CTRL = 0;
   __asm volatile("dsb\n isb" ::: "memory");
 }
 
-void guard_memory(const uint32_t *stack_guard, uint32_t log2_bytes, const void *writable) {
+void mpu_protect(const uint32_t *stack_guard, uint32_t log2_bytes, const void *writable) {
   MPU_RBAR = (uint32_t)(uintptr_t)stack_guard | MPU_RBAR_REGION(0u);
   MPU_RASR = MPU_RASR_NO_ACCESS | MPU_RASR_BYTES(log2_bytes) | MPU_RASR_ENABLE;
   MPU_RBAR = MPU_RBAR_REGION(1u);
   MPU_RASR = MPU_RASR_NO_ACCESS | MPU_RASR_BYTES(8u) | MPU_RASR_ENABLE;
-  guard_writes((uint32_t)(uintptr_t)writable);
+  protect_writes((uint32_t)(uintptr_t)writable);
   MPU_CTRL = MPU_CTRL_DEFAULT_MAP | MPU_CTRL_ENABLE;
   __asm volatile("dsb\n isb" ::: "memory");
 }

@@ -31,11 +31,11 @@ static void begin_saving(void) {
   CLOCKS_SLEEP_EN0 = SLEEP_EN0_PLL_USB;
   CLOCKS_SLEEP_EN1 = SLEEP_EN1_TIMER | SLEEP_EN1_USBCTRL | SLEEP_EN1_WATCHDOG;
   REG32(SCB_SCR) = SCB_SCR_SLEEPDEEP;
-  pico_set_supply(PICO_SUPPLY_FRUGAL);
+  pico_set_supply(PICO_SUPPLY_PFM);
 }
 
 static void end_saving(void) {
-  pico_set_supply(PICO_SUPPLY_STEADY);
+  pico_set_supply(PICO_SUPPLY_PWM);
   REG32(SCB_SCR) = 0;
   CLOCKS_SLEEP_EN0 = SLEEP_EN_ALL;
   CLOCKS_SLEEP_EN1 = SLEEP_EN_ALL;
