@@ -19,7 +19,7 @@ _Noreturn void clocks_reset_chip(void) {
   }
 }
 
-/* With ticks of clk_ref, which until the crystal drives it are up to seven times as long. */
+/* Counts ticks of clk_ref, which are up to seven times as long until the crystal drives it. */
 static void start_watchdog(void) {
   PSM_WDSEL = PSM_WDSEL_ALL_BUT_OSCILLATORS;
   WATCHDOG_TICK = WATCHDOG_TICK_ENABLE | CRYSTAL_kHz / 1000;

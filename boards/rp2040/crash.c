@@ -18,7 +18,7 @@
 #define RECORD_MAGIC UINT32_C(0x63726173)
 #define NOINIT __attribute__((noinit))
 
-/* From the warning to the reset */
+/* Time from the warning to the reset */
 #define LAST_WORDS_us 20000u
 
 enum { VECTOR_PANIC = 0, VECTOR_HARD_FAULT = 3, VECTOR_UNFED = 16 + RP2040_IRQ_TIMER_2 };
@@ -39,7 +39,7 @@ struct event {
   uint8_t code, detail;
 };
 
-/* Of this life; the next one may find it. A part that reports progress interrupts the others. */
+/* State of this run; the next one may find it. A part that reports progress interrupts the others. */
 static NOINIT struct {
   volatile uint32_t alive_us[PORT_PARTS]; /* the timer's low word */
   volatile bool watched[PORT_PARTS];

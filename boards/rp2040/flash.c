@@ -35,7 +35,7 @@ enum { STATUS_BUSY = 1 << 0, ID_DUMMY_BYTES = 4, HEAD_BYTES = 4 };
 /* The FIFOs hold 16 frames, and 16 bytes at 31.25 MHz take 4.1 us. A poll takes 8 cycles or more. */
 enum { FIFO_FRAMES = 16, EXCHANGE_POLLS = 1000 };
 _Static_assert(HEAD_BYTES + PORT_FLASH_READ_BYTES <= FIFO_FRAMES, "a reading is one exchange");
-/* Of a page that is written: 3.1 us with the head, so that no frame waits long. */
+/* Bytes of a page that are written at a time: 3.1 us with the head, so that no frame waits long. */
 enum { SLICE_BYTES = 12 };
 
 #define BUSY_MAX_us (FLASH_ERASE_MAX_us + 100000u)
@@ -65,7 +65,7 @@ static void restart_interface(void) {
   SSI_SSIENR = 1;
 }
 
-/* At most FIFO_FRAMES bytes both ways. */
+/* Transfers at most FIFO_FRAMES bytes both ways. */
 static enum ft_status exchange(uint8_t *bytes, size_t count) {
   for (size_t i = 0; i < count; i++)
     SSI_DR0 = bytes[i];

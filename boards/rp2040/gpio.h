@@ -20,7 +20,7 @@ void gpio_set_pad(unsigned pin, enum gpio_pull pull);
 
 void gpio_set_function(unsigned pin, enum gpio_function function);
 
-/* As gpio_set_function, but the pin is never driven, and the function reads it as high. */
+/* The same, but the pin is never driven, and the function reads it as high. */
 void gpio_set_function_reading_high(unsigned pin, enum gpio_function function);
 
 /* Under GPIO_FUNCTION_SIO: the level to drive, and whether to drive it. */

@@ -9,5 +9,5 @@ static inline uint32_t disable_interrupts(void) {
   return primask;
 }
 
-/* As they were before. */
+/* Restores them as they were before. */
 static inline void restore_interrupts(uint32_t primask) { __asm volatile("msr primask, %0" ::"r"(primask) : "memory"); }

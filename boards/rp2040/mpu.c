@@ -16,7 +16,7 @@
 #define MPU_RASR_BYTES(log2) (((log2)-1u) << 1)
 #define MPU_RASR_ENABLE (1u << 0)
 
-/* From the start of SRAM. Each region covers eighths of its size, and the next one, of the size of an eighth, what is left. */
+/* Protects from the start of SRAM on. Each region covers eighths of its size; the next one, an eighth in size, covers the rest. */
 static void protect_writes(uint32_t end) {
   extern const uint32_t __image_start[];
   uint32_t at = (uint32_t)(uintptr_t)__image_start;

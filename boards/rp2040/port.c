@@ -36,7 +36,7 @@ uint64_t port_now_us(void) {
   return (uint64_t)high_again << 32 | low;
 }
 
-/* Of times within the horizon */
+/* For times within the horizon */
 static bool is_past(uint32_t t_us) { return (int32_t)(t_us - TIMER_TIMERAWL) <= 0; }
 
 void port_set_event_handler(void (*handler)(void *context), void *context) {
@@ -51,7 +51,7 @@ void rp2040_event(void) {
     event.handler(event.context);
 }
 
-/* With interrupts disabled, or in an interrupt. */
+/* Call it with interrupts disabled, or in an interrupt. */
 static void arm_alarm(void) {
   uint64_t now_us = port_now_us();
   alarm.is_far = alarm.due_us > now_us + ALARM_HORIZON_us;

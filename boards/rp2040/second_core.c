@@ -53,7 +53,7 @@ static bool is_echoed(uint32_t word) {
   return wait_for(SIO_FIFO_ST_VALID) && SIO_FIFO_RD == word;
 }
 
-/* As the boot ROM wants it (pico-bootrom-rp2040, bootrom_rt0.S wait_for_vector). */
+/* The handshake of the boot ROM (pico-bootrom-rp2040, bootrom_rt0.S wait_for_vector). */
 static bool launch(void) {
   const uint32_t words[] = {
       0, 0, 1, (uint32_t)(uintptr_t)__vectors, (uint32_t)(uintptr_t)__second_stack_top, (uint32_t)(uintptr_t)run,

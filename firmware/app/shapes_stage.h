@@ -35,7 +35,7 @@ void shapes_stage_locate(const struct shapes_stage *stage, const struct location
 /* Fills in what this stage knows of a contact packet. */
 void shapes_stage_fill(const struct shapes_stage *stage, const struct findings *found, struct wire_contact *packet);
 
-/* As tangential_stage_use_profile. */
+/* Sets the profile, as tangential_stage_use_profile does. */
 void shapes_stage_use_profile(struct shapes_stage *stage, const struct pad_profile *profile);
 
 /* jobs_cancel was called: the contact is forgotten. */

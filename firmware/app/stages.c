@@ -28,7 +28,7 @@ void stages_start(struct stages *stages) {
 #endif
 }
 
-/* From now on the main loop is at this. */
+/* Notes what the main loop does from now on. */
 static void begin(struct findings *found, enum crash_activity activity) {
   const uint32_t now_us = (uint32_t)port_now_us();
   found->spent_us[found->activity] += now_us - found->since_us;

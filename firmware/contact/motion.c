@@ -80,7 +80,7 @@ static bool reaches(const struct motion_ring *ring, uint32_t now_us, uint32_t sp
   return ring->count == MOTION_ENTRIES || (ring->count > 1 && age_us(ring, ring->count - 1u, now_us) >= span_us);
 }
 
-/* From one span of time to another. */
+/* The change from one span of time to another. */
 struct change {
   int32_t x_um, y_um, ratio_x_um, ratio_y_um;
   int32_t variance_um2; /* of the noise of x and y together */
@@ -106,7 +106,7 @@ static struct change change_of(const struct motion_history *history, const struc
   uint32_t latest = back_to(ring, now->t_us, spans->latest_us);
   uint32_t end = back_to(ring, now->t_us, spans->gap_end_us);
   uint32_t begin = back_to(ring, now->t_us, spans->begin_us);
-  /* Of frames far apart, the ones before. */
+  /* Where frames are far apart, those before. */
   begin = begin > latest ? begin : latest + 1;
   end = end < begin ? end : begin - 1;
   const struct motion_sums *a = &ring->sums[place_of(ring, begin)];

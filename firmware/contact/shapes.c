@@ -25,7 +25,7 @@ static float arc_tangent(float z) {
   return z * (0.999866f + z2 * (-0.3302995f + z2 * (0.180141f + z2 * (-0.085133f + z2 * 0.0208351f))));
 }
 
-/* Of (along_x, along_y), along_x >= 0. */
+/* The angle of (along_x, along_y), along_x >= 0. */
 static float direction_deg(float along_x, float along_y) {
   const float y = fabsf(along_y);
   float angle_rad = y <= along_x ? arc_tangent(along_x > 0.0f ? y / along_x : 0.0f) : 1.5707963f - arc_tangent(along_x / y);

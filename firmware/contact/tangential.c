@@ -63,11 +63,11 @@ void tangential_estimate(void *job) {
 
 void tangential_reset(struct tangential_history *history) { memset(history, 0, sizeof *history); }
 
-/* As struct pad_edges has them. */
+/* In the order of struct pad_edges. */
 enum edge { RATIO_X, RATIO_Y, GAIN_X, GAIN_Y, PLACE_X_mm, PLACE_Y_mm, PULL_X_mm, PULL_Y_mm, FORCE };
 _Static_assert(FORCE + 1 == PAD_EDGE_KINDS, "all of them");
 
-/* In soft float what follows takes a tenth of a frame at OSR 256. */
+/* Soft float would take a tenth of a frame at OSR 256 for what follows. */
 #define UNITS_PER_mm_Q32 429496730 /* of pad_edges */
 #define RATIO_MAX_Q26 ((4 << 26) - 1)
 #define FACTOR_MAX_Q20 ((16 << 20) - 1)

@@ -30,7 +30,7 @@ void tangential_configure(struct tangential_settings *tangential, const struct p
  * first estimate. Long enough for the mean of a hundred frames, short before any lift. */
 #define TANGENTIAL_ZERO_us 100000u
 
-/* Of the contact under way. */
+/* State of the contact under way. */
 struct tangential_history {
   uint64_t first_us; /* of its first estimate */
   uint32_t count;    /* of estimates in the sums; 0: none yet */

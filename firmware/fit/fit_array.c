@@ -13,7 +13,7 @@ _Thread_local int fit_grid_columns, fit_grid_rows; /* fit_grid_parts.h */
 #define POSITION_MAX_mm 10000.0f
 #define MARGIN 1.5f   /* pitches around the array in which a contact may lie */
 #define ON_NODE 1e-4f /* pitches; the same off a line */
-/* Of a location, with a pitch of 2^23 to 2^24: the array and its margin beside it fit into 2^30. */
+/* Limit of a location, with a pitch of 2^23 to 2^24: the array and its margin beside it fit into 2^30. */
 #define ORIGIN_MAX 1073741824.0f
 
 /* value > 0 as mantissa * 2^exponent with a mantissa of 2^29 .. 2^30. */

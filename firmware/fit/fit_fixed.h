@@ -187,7 +187,7 @@ FIXED_INLINE struct scaled scaled_div(struct scaled a, struct scaled b) {
   return scaled_from(port_divide(a.mantissa * (1 << 15), divisor), a.exponent - b.exponent - 15);
 }
 
-/* In Qq, saturated to +-2^30. */
+/* The value in Qq, saturated to +-2^30. */
 FIXED_INLINE int32_t scaled_to_fixed(struct scaled a, int32_t q) {
   int32_t shift = a.exponent + q;
   if (shift > 15) {

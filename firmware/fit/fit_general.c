@@ -69,7 +69,7 @@ static float clamp(float value, float low, float high) {
 /* NaN and infinity count as high. */
 static float at_most(float value, float high) { return value < high ? value : high; }
 
-/* In place, matrix = L D L^T: L below the diagonal, D on it. A pivot below its floor is raised to it, which shortens
+/* Factorises in place, matrix = L D L^T: L below the diagonal, D on it. A pivot below its floor is raised to it, which shortens
  * the step in a direction that the readings do not determine. Returns whether that happened. */
 static bool factorise(struct normal_equations *normal) {
   bool deficient = false;
@@ -372,7 +372,7 @@ static void add_sensor_errors(const struct samples *samples, const struct fit_se
   errors->force += shape_force * shape_force * strength * strength;
 }
 
-/* As fit_grid_remove_deviations. */
+/* The same as fit_grid_remove_deviations. */
 static void remove_deviations(const struct fit_deviation *deviations, const struct parameters *at, struct samples *samples) {
   const float inverse = 1.0f / (at->sigma * at->sigma);
   for (int k = 0; k < samples->count; k++) {

@@ -351,9 +351,9 @@ struct moves {
   int32_t column[MAX_COLUMNS], row[MAX_ROWS];
 };
 
-/* As fit_grid_add_influence, without the work for the moves. */
-static NOINLINE void add_moves(const struct moments *m, const struct moves *moves, const struct readings *work, uint32_t *by_gains,
-                               int32_t *by_shape) {
+/* The same as fit_grid_add_influence, from factors instead of the influence of each sensor. */
+static NOINLINE void add_influence(const struct moments *m, const struct moves *moves, const struct readings *work, uint32_t *by_gains,
+                                   int32_t *by_shape) {
   const int32_t *errors = work->q14, *shapes = work->residual;
   uint32_t squares = *by_gains;
   int32_t sum = 0;
@@ -428,14 +428,14 @@ static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const stru
   struct moves moves;
   set_parts(x, COLUMNS, propagation->x1, propagation->x3, moves.column);
   set_parts(y, ROWS, 0, propagation->x3, moves.row);
-  add_moves(m, &moves, work, &propagation->by_gains, &propagation->shape_x);
+  add_influence(m, &moves, work, &propagation->by_gains, &propagation->shape_x);
   set_parts(x, COLUMNS, 0, propagation->y3, moves.column);
   set_parts(y, ROWS, propagation->y2, propagation->y3, moves.row);
-  add_moves(m, &moves, work, &propagation->by_gains, &propagation->shape_y);
+  add_influence(m, &moves, work, &propagation->by_gains, &propagation->shape_y);
   set_parts(x, COLUMNS, propagation->f1, propagation->f3, moves.column);
   set_parts(y, ROWS, propagation->f2, propagation->f3, moves.row);
   UNROLL for (int j = 0; j < ROWS; j++) { moves.row[j] += (propagation->f0 * y->g_q14[j]) >> 13; }
-  add_moves(m, &moves, work, &propagation->force_by_gains, &propagation->shape_force);
+  add_influence(m, &moves, work, &propagation->force_by_gains, &propagation->shape_force);
   set_parts(x, COLUMNS, 0, shape->x * 2, moves.column);
   set_parts(y, ROWS, 0, shape->y * 2, moves.row);
   add_shape_moves(m, &moves, work, shape);

@@ -74,7 +74,7 @@ struct columns {
 struct ridge {
   int32_t finest_q, norm;
 };
-/* Of the guess: 0.003. Of the iterations: 2^-31, below which columns are rounding. */
+/* Ridge of the guess: 0.003. Ridge of the iterations: 2^-31, below which columns are rounding. */
 static const struct ridge guess_ridge = {20, 206158430}; /* 0.003 * 2^36 */
 static const struct ridge rounding_ridge = {24, 1 << 13};
 #define GUESS_RIDGE_HEIGHT ((struct scaled){25733, -21}) /* 0.003 * log2(e) / (2 * 0.42^2) */
@@ -164,7 +164,7 @@ FIXED_INLINE int32_t times_q12(int32_t value, int32_t coefficient) {
 /* product / norm in Q12. */
 FIXED_INLINE int32_t factor(int32_t product, int32_t norm) { return fixed_clamp(port_divide(product, norm >> 12), -INT16_MAX, INT16_MAX); }
 
-/* From Q12 in units of columns to LINEAR_Q. */
+/* Converts from Q12 in units of columns to LINEAR_Q. */
 FIXED_INLINE int32_t to_poly(int32_t factor_q12, int32_t finer, int32_t limit) {
   int32_t shift = finer + LINEAR_Q - 12;
   shift = shift > 14 ? 14 : shift;

@@ -158,7 +158,7 @@ void fit_grid_remove_dip(const struct fit_array *array, const int32_t *pressure_
 #define SHARE_MAX_Q15 ((int32_t)(FIT_DEVIATION_SHARE_MAX * 32768.0f))
 #define SLOPE_MAX_Q11 (7 << 11) /* what it makes is at its limit before, or nothing */
 
-/* Of the nodes along an axis: the Gaussian's factor, and from the contact x / sigma^2 per pitch and x^2 / sigma^2. */
+/* At the nodes along an axis: the Gaussian's factor, and from the contact x / sigma^2 per pitch and x^2 / sigma^2. */
 struct deviation_axis {
   int32_t gaussian_q30[MAX_SIDE], slope_q11[MAX_SIDE], square_q11[MAX_SIDE];
 };

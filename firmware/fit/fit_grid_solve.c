@@ -7,7 +7,7 @@
 /* Longest step: 0.6 pitch in x and y, 0.4 of sigma. A longer one is shortened as a whole (NUMERICS.md, "Step"). */
 #define MOVE_INVERSE_Q6 107 /* 1 / 0.6 */
 #define RATIO_INVERSE_Q1 5  /* 1 / 0.4 */
-/* By how much an iterate may leave the box that the result is held to, for the same reason. */
+/* An iterate may leave the box of the result by this much, for the same reason. */
 #define OVERSHOOT_Q26 (ONE_Q26 / 4)
 
 #define PEAK_RISE_MAX_Q22 (20 << 22)                      /* a factor of a million */

@@ -82,7 +82,7 @@ FIXED_INLINE struct scaled fit_grid_reciprocal(struct scaled value) { return sca
 /* Error propagation: how an error of each reading moves the result. fit_limits.h lists the errors. For those that are the same for every
  * sensor, as the noise, the norms of the columns suffice. Gains differ between sensors, and the model's error has a shape. */
 
-/* Of the columns p1, p2, p3 of struct fit_equations, times e: value = integer * 2^-q. */
+/* Formats of the columns p1, p2, p3 of struct fit_equations, times e: value = integer * 2^-q. */
 struct fit_columns_q {
   int32_t q1, q2, q3;
 };

@@ -85,7 +85,7 @@ static inline float fit_location_sd_limit_mm(const struct fit_settings *settings
 #define FIT_PRIOR_WIDTH_MIN_mm 0.001f
 #define FIT_PRIOR_MAX_mm 10000.0f
 
-/* By the bits too: NaN and -0 are above the limits. */
+/* Compares bits as well: NaN and -0 are above the limits. */
 static inline bool fit_has_prior(const struct fit_settings *settings) {
   uint32_t least = bytes_from_f32(FIT_PRIOR_WIDTH_MIN_mm), most = bytes_from_f32(FIT_PRIOR_MAX_mm);
   return bytes_from_f32(settings->prior_width_mm) - least <= most - least && bytes_from_f32(settings->prior_sigma_mm) <= most;

@@ -78,7 +78,7 @@ static NOINLINE void put_two(const struct fit_shapes_pad *pad, const struct fit_
   }
 }
 
-/* Of two unknowns behind one another. */
+/* Standard deviation of two consecutive unknowns together. */
 static NOINLINE float sd_of_both(const struct fit_shapes_equations *equations, int first, const struct scales *scales) {
   struct scaled both =
       scaled_add(variance_of(equations, first, ONE_Q20, first + 1, 0), variance_of(equations, first + 1, ONE_Q20, first, 0));

@@ -64,7 +64,7 @@ void fit_shapes_round_locations(struct fit_shapes_at *at);
 void fit_shapes_set_rows(struct fit_shapes_pad *pad, int model, int count, const struct fit_shapes_at *where,
                          struct fit_shapes_equations *equations);
 
-/* Of half a line, or of half of what lies between two, Q20. */
+/* Square of half a line, or of half the distance between two contacts, Q20. */
 static inline int32_t fit_shapes_span_square(const int32_t *at) {
   int32_t x_q10 = at[SPAN_X] >> 10, y_q10 = at[SPAN_Y] >> 10;
   return x_q10 * x_q10 + y_q10 * y_q10;

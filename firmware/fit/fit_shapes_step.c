@@ -194,7 +194,7 @@ int32_t fit_shapes_chi_square(const struct fit_shapes_pad *pad, const struct fit
   return fit_scaled_to_fixed(scaled_div(squares, scaled_mul(base, base)), 8);
 }
 
-/* At a limit that it wants to pass, but for rounding, the spread is no unknown: the others would step as if it moved. */
+/* A spread at a limit that its step would pass is held, as the others would step as if it moved. */
 static void hold_spread(const struct fit_shapes_pad *pad, struct fit_shapes_equations *equations, int32_t spread) {
   int32_t right = equations->right[SPREAD];
   if (!((spread < pad->spread_min_q20 + 256 && right < 0) || (spread > pad->spread_max_q20 - 256 && right > 0))) {

@@ -151,7 +151,7 @@ NOINLINE static void set_from_fit(const struct fit_pad *pad, const struct fit_re
   at->amplitude_q24 = fixed_clamp(fit_scaled_to_fixed(amplitude, 24), 1 << 18, AMPLITUDE_MAX_Q24);
 }
 
-/* Of 2^bits. */
+/* To the nearest multiple of 2^bits. */
 static int32_t round_to(int32_t value, int bits) { return rounded(value, bits) * (1 << bits); }
 
 static int32_t scale_by(int32_t value, int32_t share_q13, int32_t most) {

@@ -37,7 +37,7 @@ enum port_part { PORT_PART_SCAN, PORT_PART_USB, PORT_PARTS };
 #define PORT_PART_LIMIT_us 400000u
 void port_report_alive(enum port_part part);
 
-/* For the record of a crash: what the main loop is at, and what happened (common/crash.h for the details). Main context only. */
+/* For the record of a crash: what the main loop does, and what happened (common/crash.h has the details). Main context only. */
 void port_set_activity(enum crash_activity activity);
 void port_log_event(enum crash_event event, uint8_t detail);
 

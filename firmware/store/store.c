@@ -212,7 +212,7 @@ static void make_record(struct store *store, const struct parts *parts) {
   store->record_length = (uint16_t)(PAYLOAD_AT + length);
 }
 
-/* Of the record in the buffer, by its length. */
+/* The CRC of the record in the buffer. */
 static uint32_t record_crc(const struct store *store) {
   uint32_t crc = CRC32_BEGIN;
   for (unsigned i = MAGIC_AT; i < store->record_length; i++) {

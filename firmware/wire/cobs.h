@@ -8,7 +8,7 @@
 /* Bytes without a zero that one code covers, and the code itself */
 enum { COBS_RUN = 255 };
 
-/* In place: the first byte of frame is free, length bytes follow, and room for what COBS adds.
+/* Encodes in place: the first byte of frame is free, length bytes follow, and room for what COBS adds.
  * Returns the length of the whole with its delimiter. */
 static inline size_t cobs_encode(uint8_t *frame, size_t length) {
   uint8_t *code_at = frame;
@@ -31,7 +31,7 @@ static inline size_t cobs_encode(uint8_t *frame, size_t length) {
   }
 }
 
-/* In place. Returns 0 for bytes that no COBS encoder produces. */
+/* Decodes in place. Returns 0 for bytes that no COBS encoder produces. */
 static inline size_t cobs_decode(uint8_t *frame, size_t length) {
   size_t in = 0;
   size_t out = 0;

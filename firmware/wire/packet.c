@@ -88,7 +88,7 @@ static bool is_text(const uint8_t *field, unsigned count) {
 #define LOWEST_OF_EXPONENT 0x00800000u
 #define IS_FINITE(bits) (((bits)&EXPONENT) != EXPONENT)
 
-/* From one 32-bit value of a run to the next: of a pair the two take turns. */
+/* Bytes from one 32-bit value of a run to the next: the two of a pair take turns. */
 struct stride {
   int next, after;
 };
@@ -123,7 +123,7 @@ static bool put_u32(struct writer *writer, const uint8_t *field, unsigned count)
   return infinite >> 31 == 0;
 }
 
-/* From each of two arrays of sensors in turn. */
+/* Takes from two arrays of sensors in turn. */
 static bool put_pairs(struct writer *writer, const uint8_t *field, unsigned count) {
   bool finite = true;
   for (; count > 0; count--, field += 4) {

@@ -30,7 +30,7 @@ struct ClockEstimate {
 
 class ClockFit {
 public:
-  /* In order of device time. */
+  /* Add them in order of device time. */
   void add(const ClockExchange &exchange);
   /* Nothing before the first exchange. */
   const std::optional<ClockEstimate> &estimate() const { return estimate_; }

@@ -73,7 +73,7 @@ static void put(wire_packet &command, const Setting &setting, const SettingValue
   }
 }
 
-/* In units of the packet, not yet rounded. */
+/* The values in units of the packet, not yet rounded. */
 static std::optional<double> number_of(const SettingValue &value, const std::string &text) {
   if (value.words) {
     for (std::size_t i = 0; value.choices[i]; i++) {

@@ -1,4 +1,4 @@
-/* From the user's options to an open line: which fingertip, and how it is reached. */
+/* Opens a line by the user's options: which fingertip, and how it is reached. */
 #pragma once
 
 #include "libfingertip/discovery.hpp"

@@ -61,7 +61,7 @@ struct DeviceNews {
   unsigned jumps = 0;       /* clock */
 };
 
-/* From the loops' threads to the one that takes. Holds three seconds of each fingertip's news at 1308 frames/s.
+/* A queue from the loops' threads to the one that takes. It holds three seconds of each fingertip's news at 1308 frames/s.
  * A loop whose share is full stops reading, and its fingertip drops and counts what it cannot send. */
 class DeviceFeed {
 public:

@@ -24,7 +24,7 @@ struct Found {
 /* Devices with our USB ids, sorted by serial number. root: where to look for sys/ and dev/, "/" except in tests. */
 std::vector<Found> find_usb(const std::string &root = "/");
 
-/* Of a board that runs its boot ROM, as BOOTSEL makes it: which, and what to do. Empty: there is none. */
+/* Finds a board that runs its boot ROM, as BOOTSEL makes it: which, and what to do. Empty: there is none. */
 std::string find_boot_rom(const std::string &root = "/");
 
 /* The paths in the environment variable FINGERTIP_PORT, separated by colons. */

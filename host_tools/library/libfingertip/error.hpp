@@ -71,7 +71,7 @@ enum class ErrorCode {
 
 class Error : public std::runtime_error {
 public:
-  /* Of facts longer than 600 characters, which quote what may be as long as a file, the middle is left out. */
+  /* Facts may quote a whole file: of more than 600 characters the middle is left out. */
   Error(ErrorCode code, const std::string &facts)
       : std::runtime_error(facts.size() <= 600 ? facts : facts.substr(0, 300) + " ... " + facts.substr(facts.size() - 300)), code_(code) {}
   /* A text that is complete. */

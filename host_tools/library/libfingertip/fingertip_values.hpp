@@ -16,7 +16,7 @@ namespace fingertip::values {
 std::size_t count_of(std::uint8_t type);
 /* Throws Error with bad_value, which names the field, and with wrong_choice for another count. */
 wire_packet packet_of(std::uint8_t type, const double *values, std::size_t count);
-/* To count_of numbers. */
+/* Writes count_of numbers. */
 void put(const wire_packet &packet, double *values);
 
 void put(const LineStatistics &statistics, double counts[FINGERTIP_COUNTS]);

@@ -22,7 +22,7 @@ public:
   /* packet: header and body. */
   explicit Envelope(Bytes packet) : packet_(std::move(packet)) {}
 
-  /* Without what a wide packet adds. */
+  /* The version without what a wide packet adds. */
   std::uint8_t version() const { return packet_[0] & (WIRE_WIDE - 1); }
   std::uint8_t type() const { return packet_[1]; }
   std::uint16_t sequence() const;
@@ -30,7 +30,7 @@ public:
   std::uint8_t *body() { return packet_.data() + WIRE_HEADER_BYTES; }
   std::size_t body_length() const { return packet_.size() - WIRE_HEADER_BYTES; }
 
-  /* With its CRC and delimiter. */
+  /* Appends the frame with its CRC and delimiter. */
   void append_frame(Bytes &to) const;
 
 private:

@@ -12,9 +12,9 @@ class LineSink {
 public:
   virtual ~LineSink() = default;
 
-  /* Without its end. Throws Error if the disk is full, or the file cannot hold it. */
+  /* Writes a line, given without its end. Throws Error if the disk is full, or the file cannot hold it. */
   virtual void line(const std::string &text) = 0;
-  /* Of an MCAP file, before the first line: wrench, location and pressures of each row. */
+  /* Call it before the first line: an MCAP file then has wrench, location and pressures of each row. */
   virtual void repeat_every_row() {}
   /* Last of all. */
   virtual void finish() = 0;

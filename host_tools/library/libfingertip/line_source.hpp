@@ -55,13 +55,13 @@ public:
 /* Whether they begin as an MCAP file does. */
 bool is_mcap(ByteSource &bytes);
 
-/* By its first bytes: a recording, else a capture of the line. path: for messages. Throws Error for what is neither. */
+/* Whether the first bytes are those of a recording, else of a capture of the line. path: for messages. Throws Error for what is neither. */
 bool is_recording(const std::string &path, ByteSource &bytes);
 
-/* Of a recording. path: for messages. */
+/* The lines of a recording. path: for messages. */
 std::unique_ptr<LineSource> lines_of(const std::string &path, std::unique_ptr<ByteSource> bytes);
 
-/* Of files. Throw Error if it cannot be read. */
+/* The same of files. They throw Error if one cannot be read. */
 std::unique_ptr<ByteSource> open_bytes(const std::string &path);
 std::vector<std::uint8_t> all_bytes(const std::string &path);
 std::unique_ptr<LineSource> open_lines(const std::string &path);

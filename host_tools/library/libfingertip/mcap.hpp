@@ -103,7 +103,7 @@ public:
   void want(std::uint64_t from_ns, std::uint64_t to_ns, IsNeeded is_needed);
   /* Whether one was, since this was asked. */
   bool has_left_out() { return std::exchange(has_left_out_, false); }
-  /* At the end: whether the file breaks off. */
+  /* Whether the file breaks off; known at its end. */
   bool is_torn() const { return torn_; }
 
   Place place() const { return {record_, at_message_}; }

@@ -16,7 +16,7 @@ public:
   virtual void append(const void *bytes, std::size_t length) = 0;
   /* Last of all. */
   virtual void finish() = 0;
-  /* For messages. */
+  /* The name for messages. */
   virtual const std::string &path() const = 0;
 };
 

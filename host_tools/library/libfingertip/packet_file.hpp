@@ -50,15 +50,15 @@ public:
 
   /* The line's counters by the packets until now. At the end of a recording they are those of its recorder, which saw the line itself. */
   const LineStatistics &statistics() const { return state_.statistics; }
-  /* At the end of the file: a recording without its end line. */
+  /* Whether a recording has no end line; known at the end of the file. */
   bool is_cut_short() const { return state_.ended && !has_end(); }
   bool has_end() const { return reader_ ? reader_->has_end() : state_.ended; }
   std::uint64_t skipped_lines() const { return reader_ ? reader_->skipped_lines() : 0; }
   /* The recorder's own keys, once the first item was read. */
   Metadata recorder_metadata() const { return reader_ ? reader_->recorder_metadata() : Metadata(); }
-  /* Of a recording, else nullptr. */
+  /* The reader of a recording, else nullptr. */
   const RecordingReader *recording() const { return reader_.get(); }
-  /* Of a capture, as Decoder has it. */
+  /* The same as Decoder's, of a capture. */
   std::uint8_t other_version() const { return state_.decoder.other_version(); }
 
 private:

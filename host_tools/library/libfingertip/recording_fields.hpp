@@ -32,7 +32,7 @@ inline constexpr const char *PACKET_ACK = "ack";
 inline constexpr const char *PACKET_SYNC = "sync";
 inline constexpr double Q10 = 1024.0;
 
-/* Of a joint recording's fingertips, "A B"; people write "A, B". */
+/* Splits the serial numbers of a joint recording, "A B"; people write "A, B". */
 inline std::vector<std::string> serials_in(std::string text) {
   std::replace(text.begin(), text.end(), ',', ' ');
   std::vector<std::string> found;
@@ -82,7 +82,7 @@ struct PairWriter {
 /* What is wrong with a line, without its place. */
 struct Damage {
   std::string what;
-  /* For a message: the begin of it. */
+  /* The beginning of it, for a message. */
   std::string text() const { return what.size() > 200 ? what.substr(0, 200) + "..." : what; }
 };
 

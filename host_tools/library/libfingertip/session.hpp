@@ -72,7 +72,7 @@ public:
   bool reopen();
 
   const LineStatistics &statistics() const { return decoder_.statistics(); }
-  /* From the acknowledgements since the port was opened. */
+  /* The clocks' relation by the acknowledgements since the port was opened. */
   std::optional<ClockRelation> clock() const { return clock_; }
 
 private:

@@ -12,7 +12,7 @@ namespace fingertip {
 
 /* The shortest text that reads back as the same number. */
 std::string shortest(float value);
-/* With this many digits after the point. */
+/* The number with these digits after the point. */
 std::string fixed(double value, int digits);
 
 /* Nothing unless all of the text is one finite number of that type. */
@@ -57,7 +57,7 @@ std::string joined(const Range &range, const char *separator, const TextOf &text
   }
   return all;
 }
-/* For names that others chose, in one line and harmless to a terminal: control characters, and what is no UTF-8, as \x1b. */
+/* Makes names that others chose harmless to a terminal: control characters, and what is no UTF-8, become \x1b. */
 std::string printable(std::string_view text);
 std::string hex(const std::vector<std::uint8_t> &bytes);
 

@@ -35,11 +35,11 @@ public:
    * protocol version: 1200 baud, then DTR down. False: not possible here. */
   virtual bool ask_loader() { return false; }
 
-  /* To wait for several: once poll(2) reports one of these, read may have something. Ask for them
+  /* Descriptors to wait for several: once poll(2) reports one of these, read may have something. Ask for them
    * again before each wait, after reading everything. None while it is gone. */
   virtual std::vector<pollfd> poll_descriptors() const { return {}; }
 
-  /* For people: what this is. */
+  /* What this is, for people. */
   virtual std::string description() const = 0;
 };
 

@@ -63,8 +63,8 @@ Cubic cubic_at(double at, int nodes);
 // Lines from -half_mm to half_mm, at most step_mm apart.
 int block_nodes(double half_mm, double step_mm);
 
-// For each place on the base; one closer than 3 mm to a side asks for smaller elements. Runs on all processors. on_progress gets the share
-// done, on the calling thread, and 1 in the end. Throws std::runtime_error if conjugate gradients do not end.
+// Solves for each place on the base; one closer than 3 mm to a side needs smaller elements. Runs on all processors. on_progress gets the
+// share done, on the calling thread, and 1 in the end. Throws std::runtime_error if conjugate gradients do not end.
 std::vector<BlockAnswer> solve_block(const Block &block, const std::vector<Place> &places, double step_mm, const BlockGrid &grid = {},
                                      const std::function<void(double)> &on_progress = {});
 

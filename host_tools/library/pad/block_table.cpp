@@ -9,7 +9,7 @@
 
 namespace fingertip::twin {
 
-// To be raised whenever a solution changes.
+// Raise it whenever a solution changes.
 constexpr int VERSION = 1;
 // The fields bend over 3 mm and more: the cubic is good to 1e-4 of them.
 constexpr double STEP_mm = 0.5;

@@ -20,7 +20,7 @@ namespace fingertip::twin {
 
 class BlockTable {
 public:
-  // From the cache if it holds this very table, else solved (block.hpp: seconds, half a minute at
+  // Reads the table from the cache if it is there, else it is solved (block.hpp: seconds, half a minute at
   // most) and kept there; a damaged file is solved again. on_progress gets the share done, 0..1.
   // Throws std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
   static BlockTable load_or_build(const Block &block, const std::vector<Place> &sensors, const std::filesystem::path &cache_directory,

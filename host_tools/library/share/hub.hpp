@@ -41,7 +41,7 @@ public:
   void from_client(Client client, const std::uint8_t *bytes, std::size_t length, Time now);
   /* While false the clients' commands are better left where they are. */
   bool takes_commands(Time now) const;
-  /* From time to time, and after any of the above: what the hub itself asks the fingertip. */
+  /* Call it periodically, and after any of the above: it sends the hub's own requests. */
   void tick(Time now);
 
   /* Bytes for the line; they are the caller's then. */

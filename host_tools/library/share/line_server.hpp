@@ -27,7 +27,7 @@ public:
   const std::string &path() const { return path_; }
   /* Takes what the clients have sent, and answers. */
   void step();
-  /* To all clients. */
+  /* Sends to all clients. */
   void send(const std::string &line);
 
 private:

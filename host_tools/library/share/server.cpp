@@ -29,9 +29,9 @@ constexpr milliseconds REOPEN_INTERVAL{200};
 constexpr milliseconds TICK{500};
 /* A client that reads gets its last packets well within this time. */
 constexpr milliseconds LAST_PACKETS{2000};
-/* At once from one line, so that each gets its turn: 50 ms at the highest rate. */
+/* Reads from one line in a row, so that each gets its turn: 50 ms at the highest rate. */
 constexpr int READS_IN_A_ROW = 4;
-/* At most on one fingertip: with sixteen of these the process is still within 1024 descriptors, which is what systems allow by default. */
+/* Clients of one fingertip at most: sixteen of these stay within 1024 descriptors, the default limit of systems. */
 constexpr std::size_t MOST_CLIENTS = 60;
 /* Bytes taken of a client at once: some dozen commands. */
 constexpr std::size_t CLIENT_BYTES = 256;

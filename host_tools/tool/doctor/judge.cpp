@@ -98,7 +98,7 @@ public:
       }
       processor();
     }
-    if (facts_.rest && facts_.info) {
+    if (facts_.baseline && facts_.info) {
       rate();
       packets();
       if (facts_.info->sync == SYNC_IN) {
@@ -254,15 +254,15 @@ private:
   void sensors() {
     std::size_t before = findings_.size();
     missing_sensors();
-    if (facts_.rest && are_of_another_type()) {
+    if (facts_.baseline && are_of_another_type()) {
       add(Verdict::bad, "sensors",
           "they read " + fixed(middle_Pa() / 1000, 0) + " kPa at rest, as sensors do that are not those of the firmware",
           "install firmware that was built for them (cmake -DFINGERTIP_PAD=FILE.json), or the sensors that this one is "
           "for");
-    } else if (facts_.rest) {
-      for (unsigned k = 0; k < facts_.rest->sensors.size(); k++) {
+    } else if (facts_.baseline) {
+      for (unsigned k = 0; k < facts_.baseline->sensors.size(); k++) {
         if (!(missing_ >> k & 1u)) {
-          doubtful_sensor(k, facts_.rest->sensors[k]);
+          doubtful_sensor(k, facts_.baseline->sensors[k]);
         }
       }
     }
@@ -271,7 +271,7 @@ private:
     }
   }
 
-  void doubtful_sensor(unsigned k, const SensorAtRest &sensor) {
+  void doubtful_sensor(unsigned k, const SensorBaseline &sensor) {
     bool memory_bad = facts_.after->sensors_prom_bad >> k & 1u;
     if (sensor.valid_share < 1 - ABSENT_SHARE_MAX && !memory_bad) {
       add(Verdict::warn, "sensors", named(k) + " has readings in " + percent(sensor.valid_share) + " of the frames only", check_of(k), {k});
@@ -299,7 +299,7 @@ private:
 
   double middle_Pa() const {
     std::vector<double> means_Pa;
-    for (const SensorAtRest &sensor : facts_.rest->sensors) {
+    for (const SensorBaseline &sensor : facts_.baseline->sensors) {
       if (sensor.readings > 0) {
         means_Pa.push_back(sensor.mean_Pa);
       }
@@ -322,7 +322,7 @@ private:
     }
   }
 
-  double seconds() const { return facts_.rest ? std::max(facts_.rest->seconds, 1e-3) : 1; }
+  double seconds() const { return facts_.baseline ? std::max(facts_.baseline->seconds, 1e-3) : 1; }
 
   void bus() {
     const wire_health &now = *facts_.after;
@@ -389,13 +389,13 @@ private:
   }
 
   void rate() {
-    const Rest &rest = *facts_.rest;
+    const Baseline &baseline = *facts_.baseline;
     const wire_info &info = *facts_.info;
-    if (rest.frames_made == 0) {
+    if (baseline.frames_made == 0) {
       add(Verdict::bad, "rate", "no frames came", missing_ == all_ ? "see to the sensors first" : "unplug it and plug it in again");
       return;
     }
-    double rate_Hz = rest.frames_made / seconds();
+    double rate_Hz = baseline.frames_made / seconds();
     std::string text = fixed(rate_Hz, 1) + " frames/s";
     auto expected_Hz = expected_rate_Hz(info);
     if (!expected_Hz) {
@@ -428,12 +428,12 @@ private:
   }
 
   void sync() {
-    const Rest &rest = *facts_.rest;
-    std::string text = count(rest.edges, "edge") + " at the sync pin in " + fixed(rest.seconds, 1) + " s";
-    if (rest.edges_missing > 0) {
-      add(Verdict::warn, "sync", text + ", " + std::to_string(rest.edges_missing) + " missing",
+    const Baseline &baseline = *facts_.baseline;
+    std::string text = count(baseline.edges, "edge") + " at the sync pin in " + fixed(baseline.seconds, 1) + " s";
+    if (baseline.edges_missing > 0) {
+      add(Verdict::warn, "sync", text + ", " + std::to_string(baseline.edges_missing) + " missing",
           "slower pulses; a ringing wire gives edges too: join the grounds, keep it short");
-    } else if (rest.edges > 0) {
+    } else if (baseline.edges > 0) {
       add(Verdict::ok, "sync", text);
     } else {
       add(Verdict::warn, "sync", text,
@@ -443,16 +443,16 @@ private:
   }
 
   void at_rest() {
-    const Rest &rest = *facts_.rest;
-    bool touched = rest.frames_touched > 0;
+    const Baseline &baseline = *facts_.baseline;
+    bool touched = baseline.frames_touched > 0;
     std::size_t readings = 0;
-    for (const SensorAtRest &sensor : rest.sensors) {
+    for (const SensorBaseline &sensor : baseline.sensors) {
       readings = std::max(readings, sensor.readings);
     }
     bool noisy = false;
-    if (rest.sensors.empty() || readings <= STEPS_MIN) {
+    if (baseline.sensors.empty() || readings <= STEPS_MIN) {
       add(Verdict::warn, "noise",
-          rest.sensors.empty() ? "not measured: no readings came" : "not measured: " + count(readings, "reading") + " are too few",
+          baseline.sensors.empty() ? "not measured: no readings came" : "not measured: " + count(readings, "reading") + " are too few",
           !(facts_.info->capabilities & WIRE_CAPABILITY_RAW_STREAM) ? "this firmware streams none; use scene grasp or raw"
                                                                     : "measure longer, with --seconds");
     } else {
@@ -473,8 +473,8 @@ private:
     std::string sheet = fixed(*typical_Pa, 1) + " Pa in the data sheet at OSR " + std::to_string(facts_.info->osr);
     double most_Pa = 0;
     bool any = false, dead = false;
-    for (unsigned k = 0; k < facts_.rest->sensors.size(); k++) {
-      const SensorAtRest &sensor = facts_.rest->sensors[k];
+    for (unsigned k = 0; k < facts_.baseline->sensors.size(); k++) {
+      const SensorBaseline &sensor = facts_.baseline->sensors[k];
       if (!sensor.noise_Pa || sensor.readings <= STEPS_MIN) {
         continue;
       }
@@ -497,20 +497,20 @@ private:
   }
 
   void zero(bool noisy) {
-    const Rest &rest = *facts_.rest;
-    if (rest.frames_received == 0) {
+    const Baseline &baseline = *facts_.baseline;
+    if (baseline.frames_received == 0) {
       return;
     }
-    if (rest.frames_touched > 0) {
-      double share = static_cast<double>(rest.frames_touched) / static_cast<double>(rest.frames_received);
+    if (baseline.frames_touched > 0) {
+      double share = static_cast<double>(baseline.frames_touched) / static_cast<double>(baseline.frames_received);
       add(Verdict::warn, "zero",
           std::string(noisy ? "contact is reported in " : "something touches the pad in ") + percent(share) +
               " of the frames: drift was not measured",
           noisy ? "see to the noise first; else let go of the pad and run this again"
                 : "let go of the pad and run this again; where nothing touches it, `fingertip tare --force`");
-    } else if (!(rest.last_flags & CONTACT_FLAG_TARED)) {
+    } else if (!(baseline.last_flags & CONTACT_FLAG_TARED)) {
       add(Verdict::warn, "zero", "not every sensor has one", "let go of the pad, then `fingertip tare`");
-    } else if (rest.last_flags & CONTACT_FLAG_ZERO_DOUBTFUL) {
+    } else if (baseline.last_flags & CONTACT_FLAG_ZERO_DOUBTFUL) {
       add(Verdict::warn, "zero", "the pressure may be a zero that has moved", "`fingertip tare` where nothing touches the pad");
     } else {
       add(Verdict::ok, "zero", "tared, and nothing touches the pad");
@@ -533,19 +533,19 @@ private:
   }
 
   void drift() {
-    const Rest &rest = *facts_.rest;
-    if (rest.seconds < DRIFT_SECONDS_MIN) {
+    const Baseline &baseline = *facts_.baseline;
+    if (baseline.seconds < DRIFT_SECONDS_MIN) {
       add(Verdict::ok, "drift", "not measured: it takes " + fixed(DRIFT_SECONDS_MIN, 0) + " s at least");
       return;
     }
     std::string followed = "; the zero follows " + fixed(DRIFT_MAX_Pa_per_s, 1);
     double most_Pa_per_s = 0;
     bool any = false;
-    for (unsigned k = 0; k < rest.sensors.size(); k++) {
-      if (!rest.sensors[k].drift) {
+    for (unsigned k = 0; k < baseline.sensors.size(); k++) {
+      if (!baseline.sensors[k].drift) {
         continue;
       }
-      const Slope &slope = *rest.sensors[k].drift;
+      const Slope &slope = *baseline.sensors[k].drift;
       most_Pa_per_s = std::max(most_Pa_per_s, std::abs(slope.Pa_per_s));
       if (is_steep(slope)) {
         any = true;
@@ -553,9 +553,9 @@ private:
             "let it rest and warm up for some minutes; if it stays, check the joints under it", {k});
       }
     }
-    if (rest.common_drift && is_steep(*rest.common_drift)) {
+    if (baseline.common_drift && is_steep(*baseline.common_drift)) {
       any = true;
-      add(Verdict::warn, "drift", "all sensors together drift by " + fixed(rest.common_drift->Pa_per_s, 1) + " Pa/s" + followed,
+      add(Verdict::warn, "drift", "all sensors together drift by " + fixed(baseline.common_drift->Pa_per_s, 1) + " Pa/s" + followed,
           "let it warm up for some minutes; the air of the room may move too");
     }
     if (!any) {

@@ -4,8 +4,8 @@
 #include "libfingertip/decoder.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/wire.hpp"
+#include "tool/doctor/baseline.hpp"
 #include "tool/doctor/crash.hpp"
-#include "tool/doctor/rest.hpp"
 #include "tool/doctor/system.hpp"
 
 #include <array>
@@ -32,7 +32,7 @@ struct Facts {
   std::optional<wire_info> info;
   std::optional<wire_health> before, after; /* the measurement */
   std::optional<Crash> crash;               /* the last since power-on */
-  std::optional<Rest> rest;
+  std::optional<Baseline> baseline;
   LineStatistics line; /* in the measurement */
 };
 

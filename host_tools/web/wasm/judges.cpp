@@ -163,7 +163,7 @@ namespace {
 
 struct Examined {
   Facts facts;
-  RestMeter rest;
+  BaselineMeter baseline;
   bool measured = false;
 };
 
@@ -188,10 +188,10 @@ EXPORT(doctor_crash) void doctor_crash(Examined *examined) {
   }
 }
 EXPORT(doctor_take) void doctor_take(Examined *examined) {
-  examined->rest.add(packet());
+  examined->baseline.add(packet());
   examined->measured = true;
 }
-EXPORT(doctor_seconds) double doctor_seconds(const Examined *examined) { return examined->rest.seconds(); }
+EXPORT(doctor_seconds) double doctor_seconds(const Examined *examined) { return examined->baseline.seconds(); }
 EXPORT(doctor_line)
 void doctor_line(Examined *examined, double bytes, double packets, double dropped_packets, double out_of_order, double crc_errors,
                  double format_errors) {
@@ -205,7 +205,7 @@ void doctor_line(Examined *examined, double bytes, double packets, double droppe
 }
 EXPORT(doctor_status) void doctor_status(Examined *examined) {
   if (examined->measured) {
-    examined->facts.rest = examined->rest.result();
+    examined->facts.baseline = examined->baseline.result();
   }
   json findings = json::array();
   for (const Finding &finding : judge(examined->facts)) {

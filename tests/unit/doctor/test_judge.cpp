@@ -32,20 +32,20 @@ static Facts good(const char *board = "pico_mux") {
   facts.before = health;
   health.uptime_s = 70;
   facts.after = health;
-  Rest rest;
-  rest.seconds = 10;
-  rest.frames_made = static_cast<std::uint32_t>(*expected_rate_Hz(*facts.info) * 10);
-  rest.frames_received = rest.frames_made + 1;
-  rest.last_flags = CONTACT_FLAG_TARED;
-  SensorAtRest sensor;
-  sensor.readings = rest.frames_made;
+  Baseline baseline;
+  baseline.seconds = 10;
+  baseline.frames_made = static_cast<std::uint32_t>(*expected_rate_Hz(*facts.info) * 10);
+  baseline.frames_received = baseline.frames_made + 1;
+  baseline.last_flags = CONTACT_FLAG_TARED;
+  SensorBaseline sensor;
+  sensor.readings = baseline.frames_made;
   sensor.valid_share = 1;
   sensor.mean_Pa = 101325;
   sensor.noise_Pa = 3.9;
   sensor.drift = Slope{0.05, 0.03};
-  rest.sensors.assign(SENSORS, sensor);
-  rest.common_drift = Slope{-0.02, 0.01};
-  facts.rest = rest;
+  baseline.sensors.assign(SENSORS, sensor);
+  baseline.common_drift = Slope{-0.02, 0.01};
+  facts.baseline = baseline;
   facts.line.packets = 4000;
   return facts;
 }
@@ -81,15 +81,15 @@ static void fail(Facts &facts, ErrorCode code) {
   facts.info.reset();
   facts.before.reset();
   facts.after.reset();
-  facts.rest.reset();
+  facts.baseline.reset();
 }
 
 static void set_rate(Facts &facts, double share) {
-  facts.rest->frames_made = static_cast<std::uint32_t>(*expected_rate_Hz(*facts.info) * 10 * share);
+  facts.baseline->frames_made = static_cast<std::uint32_t>(*expected_rate_Hz(*facts.info) * 10 * share);
 }
 
 static void scale_pressures(Facts &facts, double factor) {
-  for (SensorAtRest &sensor : facts.rest->sensors) {
+  for (SensorBaseline &sensor : facts.baseline->sensors) {
     sensor.mean_Pa *= factor;
     sensor.saturated_share = factor > 10 ? 1 : 0;
   }
@@ -99,7 +99,7 @@ static void miss(Facts &facts, std::uint32_t sensors) { facts.after->sensors_pre
 
 static void hold(Facts &facts) { facts.holders.seen.push_back({123, "screen"}); }
 
-static void drift(Facts &facts, double Pa_per_s, double sd_Pa_per_s) { facts.rest->sensors[5].drift = Slope{Pa_per_s, sd_Pa_per_s}; }
+static void drift(Facts &facts, double Pa_per_s, double sd_Pa_per_s) { facts.baseline->sensors[5].drift = Slope{Pa_per_s, sd_Pa_per_s}; }
 
 /* The only finding, with these words and of the sensors of these bits, where this is changed of a good one. */
 struct Case {
@@ -132,14 +132,14 @@ const Case CASES[] = {
      [](Facts &f) {
        f.failure = Failure{ErrorCode::gone, "/dev/ttyACM0: vanished while it was examined"};
        f.after.reset();
-       f.rest.reset();
+       f.baseline.reset();
      }},
     {warn, "firmware", "this tool is of version 1.20.4", 0, [](Facts &f) { f.tool_version[2] = 4; }},
     {warn, "board", "unknown", 0, [](Facts &f) { set_board(f, "mine"); }},
     {bad, "sensors", "strip 1, channel 2 of multiplexer 0x71", 0x80,
      [](Facts &f) {
        miss(f, 1u << 7);
-       f.rest->sensors[7].valid_share = 0;
+       f.baseline->sensors[7].valid_share = 0;
      }},
     {bad, "sensors", "GP7 (pin 10)", 0x80,
      [](Facts &f) {
@@ -154,51 +154,51 @@ const Case CASES[] = {
        f.after->bus_timeouts = f.before->bus_timeouts = 3;
      }},
     {bad, "sensors", "SCL on GP5 (pin 7)", 0x7fff, [](Facts &f) { miss(f, 0x7FFF); }},
-    {warn, "sensors", "of the frames only", 0x4, [](Facts &f) { f.rest->sensors[2].valid_share = 0.95; }},
-    {warn, "sensors", "temperature", 0x4, [](Facts &f) { f.rest->sensors[2].doubtful_share = 0.2; }},
-    {warn, "sensors", "range", 0x4, [](Facts &f) { f.rest->sensors[2].saturated_share = 0.2; }},
-    {warn, "sensors", "-25 kPa apart", 0x4, [](Facts &f) { f.rest->sensors[2].mean_Pa -= 25000; }},
+    {warn, "sensors", "of the frames only", 0x4, [](Facts &f) { f.baseline->sensors[2].valid_share = 0.95; }},
+    {warn, "sensors", "temperature", 0x4, [](Facts &f) { f.baseline->sensors[2].doubtful_share = 0.2; }},
+    {warn, "sensors", "range", 0x4, [](Facts &f) { f.baseline->sensors[2].saturated_share = 0.2; }},
+    {warn, "sensors", "-25 kPa apart", 0x4, [](Facts &f) { f.baseline->sensors[2].mean_Pa -= 25000; }},
     {bad, "sensors", "not those of the firmware", 0, [](Facts &f) { scale_pressures(f, 0.05); }},
     {bad, "sensors", "not those of the firmware", 0, [](Facts &f) { scale_pressures(f, 20); }},
     {bad, "prom", "check sum", 0x8,
      [](Facts &f) {
        f.after->sensors_prom_bad = 1u << 3;
-       f.rest->sensors[3].doubtful_share = 1;
+       f.baseline->sensors[3].doubtful_share = 1;
      }},
-    {warn, "noise", "8.2 Pa rms", 0x200, [](Facts &f) { f.rest->sensors[9].noise_Pa = 2.1 * 3.9; }},
-    {bad, "noise", "39.0 Pa rms", 0x200, [](Facts &f) { f.rest->sensors[9].noise_Pa = 39; }},
+    {warn, "noise", "8.2 Pa rms", 0x200, [](Facts &f) { f.baseline->sensors[9].noise_Pa = 2.1 * 3.9; }},
+    {bad, "noise", "39.0 Pa rms", 0x200, [](Facts &f) { f.baseline->sensors[9].noise_Pa = 39; }},
     {warn, "noise", "39.0 Pa rms", 0x200,
      [](Facts &f) {
-       f.rest->sensors[9].noise_Pa = 39;
+       f.baseline->sensors[9].noise_Pa = 39;
        f.info->osr = 256; /* 11 Pa are its noise */
        set_rate(f, 1);
      }},
-    {bad, "noise", "do not change", 0x200, [](Facts &f) { f.rest->sensors[9].noise_Pa = 0; }},
+    {bad, "noise", "do not change", 0x200, [](Facts &f) { f.baseline->sensors[9].noise_Pa = 0; }},
     {warn, "noise", "--seconds", 0,
      [](Facts &f) {
        f.info->rate_mHz = 1000;
-       f.rest->frames_made = 10;
-       for (SensorAtRest &sensor : f.rest->sensors) {
+       f.baseline->frames_made = 10;
+       for (SensorBaseline &sensor : f.baseline->sensors) {
          sensor.readings = 11;
          sensor.noise_Pa = 39;
        }
      }},
     {warn, "noise", "scene", 0,
      [](Facts &f) {
-       f.rest->sensors.clear();
+       f.baseline->sensors.clear();
        f.info->capabilities &= ~static_cast<std::uint32_t>(WIRE_CAPABILITY_RAW_STREAM);
      }},
     {bad, "processor", "the second one does not run", 0,
      [](Facts &f) { f.after->capabilities |= static_cast<std::uint32_t>(WIRE_CAPABILITY_TANGENTIAL); }},
     {warn, "drift", "-3.0 Pa/s", 0x20, [](Facts &f) { drift(f, -3, 0.05); }},
-    {warn, "drift", "all sensors together", 0, [](Facts &f) { f.rest->common_drift->Pa_per_s = 3; }},
+    {warn, "drift", "all sensors together", 0, [](Facts &f) { f.baseline->common_drift->Pa_per_s = 3; }},
     {warn, "zero", "something touches the pad", 0,
      [](Facts &f) {
-       f.rest->frames_touched = 400;
+       f.baseline->frames_touched = 400;
        drift(f, 300, 0.1);
      }},
-    {warn, "zero", "not every sensor has one", 0, [](Facts &f) { f.rest->last_flags = 0; }},
-    {warn, "zero", "may be a zero that has moved", 0, [](Facts &f) { f.rest->last_flags |= CONTACT_FLAG_ZERO_DOUBTFUL; }},
+    {warn, "zero", "not every sensor has one", 0, [](Facts &f) { f.baseline->last_flags = 0; }},
+    {warn, "zero", "may be a zero that has moved", 0, [](Facts &f) { f.baseline->last_flags |= CONTACT_FLAG_ZERO_DOUBTFUL; }},
     {warn, "rate", "expected", 0, [](Facts &f) { set_rate(f, 0.9); }},
     {bad, "rate", "expected", 0, [](Facts &f) { set_rate(f, 0.5); }},
     {warn, "bus", "2.0 NACKs/s", 0, [](Facts &f) { f.after->bus_nacks = 20; }},
@@ -209,8 +209,8 @@ const Case CASES[] = {
     {warn, "sync", "600 edges at the sync pin in 10.0 s, 3 missing", 0,
      [](Facts &f) {
        f.info->sync = 1;
-       f.rest->edges = 600;
-       f.rest->edges_missing = 3;
+       f.baseline->edges = 600;
+       f.baseline->edges_missing = 3;
      }},
     {warn, "sync", "0 edges at the sync pin in 10.0 s; join the pin", 0, [](Facts &f) { f.info->sync = 1; }},
     {warn, "sync", "set sync=off", 0, [](Facts &f) { f.info->sync = 1; }},
@@ -230,25 +230,25 @@ static void (*const FINE[])(Facts &) = {
       set_board(f, "pico_parallel");
       set_rate(f, 1);
     },
-    [](Facts &f) { f.rest->edges = 600; },
+    [](Facts &f) { f.baseline->edges = 600; },
     [](Facts &f) { f.info->sync = 2; }, /* pulses at each frame, which are no packets */
     [](Facts &f) {
       f.info->sync = 1;
-      f.rest->edges = 600;
+      f.baseline->edges = 600;
     },
-    [](Facts &f) { f.rest->sensors[2].valid_share = 0.991; },
+    [](Facts &f) { f.baseline->sensors[2].valid_share = 0.991; },
     [](Facts &f) { scale_pressures(f, 5); }, /* it is pressed */
-    [](Facts &f) { f.rest->sensors[9].noise_Pa = 1.9 * 3.9; },
+    [](Facts &f) { f.baseline->sensors[9].noise_Pa = 1.9 * 3.9; },
     [](Facts &f) { drift(f, -3, 1); }, /* not sure */
     [](Facts &f) {
       drift(f, -3, 0.05);
-      f.rest->seconds = 5; /* too short */
-      f.rest->frames_made /= 2;
+      f.baseline->seconds = 5; /* too short */
+      f.baseline->frames_made /= 2;
     },
     [](Facts &f) { set_rate(f, 0.98); },
     [](Facts &f) {
       f.info->rate_mHz = 20000; /* as asked for */
-      f.rest->frames_made = 200;
+      f.baseline->frames_made = 200;
     },
     [](Facts &f) { f.before->bus_nacks = f.after->bus_nacks = 100; }, /* long ago */
 };
@@ -305,8 +305,8 @@ TEST(Judge, SensorsAreNamedOneByOneWithoutMultiplexersOrABoard) {
 
 TEST(Judge, NoiseIsNamedBeforeATouchThatItLooksLike) {
   Facts facts = good();
-  facts.rest->frames_touched = 400;
-  facts.rest->sensors[5].noise_Pa = 100;
+  facts.baseline->frames_touched = 400;
+  facts.baseline->sensors[5].noise_Pa = 100;
   auto findings = wrong(facts);
   ASSERT_EQ(kinds(findings), "bad noise, warn zero");
   EXPECT_FALSE(contains(findings[1].text, "something touches"));
@@ -329,7 +329,7 @@ TEST(Judge, RatesAreThoseOfTheReleaseImages) {
 
 TEST(Judge, NoFrames) {
   Facts facts = good();
-  facts.rest = Rest();
+  facts.baseline = Baseline();
   EXPECT_EQ(kinds(wrong(facts)), "bad rate, warn noise");
 }
 

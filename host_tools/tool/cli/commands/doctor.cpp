@@ -93,7 +93,7 @@ void ask_for_crash(Session &session, Facts &facts, const std::string &elf) {
 
 void measure(Session &session, Facts &facts, const std::string &elf, double seconds, const std::function<bool()> &stop,
              const std::function<void(double)> &progress) {
-  RestMeter meter;
+  BaselineMeter meter;
   std::int64_t last_us = steady_now_us();
   session.on_packet([&](const wire_packet &packet) {
     last_us = is_frame(packet) ? steady_now_us() : last_us;
@@ -113,7 +113,7 @@ void measure(Session &session, Facts &facts, const std::string &elf, double seco
     progress(meter.seconds() / seconds);
   }
   facts.line = session.statistics() - before;
-  facts.rest = meter.result();
+  facts.baseline = meter.result();
   facts.after = session.health().body.health;
   ask_for_crash(session, facts, elf); /* it may have crashed meanwhile */
   session.on_packet({});
@@ -183,10 +183,10 @@ Json place_json(const std::optional<Wiring> &wiring, unsigned sensor) {
 }
 
 Json measured_json(const Facts &facts, const std::optional<Wiring> &wiring) {
-  const Rest &rest = *facts.rest;
+  const Baseline &baseline = *facts.baseline;
   Json sensors = Json::array();
-  for (unsigned k = 0; k < rest.sensors.size(); k++) {
-    const SensorAtRest &sensor = rest.sensors[k];
+  for (unsigned k = 0; k < baseline.sensors.size(); k++) {
+    const SensorBaseline &sensor = baseline.sensors[k];
     Json json = place_json(wiring, k);
     json["readings"] = sensor.readings;
     json["valid_share"] = sensor.valid_share;
@@ -196,11 +196,11 @@ Json measured_json(const Facts &facts, const std::optional<Wiring> &wiring) {
     json["drift_sd_Pa_per_s"] = sensor.drift ? Json(sensor.drift->sd_Pa_per_s) : Json(nullptr);
     sensors.push_back(json);
   }
-  return {{"seconds", rest.seconds},
-          {"rate_Hz", rest.seconds > 0 ? Json(rest.frames_made / rest.seconds) : Json(nullptr)},
+  return {{"seconds", baseline.seconds},
+          {"rate_Hz", baseline.seconds > 0 ? Json(baseline.frames_made / baseline.seconds) : Json(nullptr)},
           {"expected_rate_Hz", or_null(expected_rate_Hz(*facts.info))},
           {"expected_noise_Pa", or_null(expected_noise_Pa(facts.info->osr))},
-          {"touched_frames", rest.frames_touched},
+          {"touched_frames", baseline.frames_touched},
           {"lost_packets", facts.line.dropped_packets},
           {"sensors", sensors}};
 }
@@ -247,7 +247,7 @@ Json to_json(const Facts &facts, const std::vector<Finding> &findings) {
   if (facts.crash) {
     json["crash"] = crash_json(*facts.crash);
   }
-  if (facts.rest) {
+  if (facts.baseline) {
     json["measured"] = measured_json(facts, wiring);
   }
   if (facts.after) {

@@ -1,4 +1,4 @@
-#include "tool/doctor/rest.hpp"
+#include "tool/doctor/baseline.hpp"
 
 #include "libfingertip/packet_fields.hpp"
 
@@ -46,13 +46,13 @@ static std::optional<Slope> slope(const Means &means, double seconds) {
     ty += (at - t / n) * (mean - y / n);
   }
   for (const auto &[at, mean] : points) {
-    const double rest = mean - y / n - ty / tt * (at - t / n);
-    squares += rest * rest;
+    const double residual = mean - y / n - ty / tt * (at - t / n);
+    squares += residual * residual;
   }
   return Slope{ty / tt, std::sqrt(squares / (n - 2) / tt)};
 }
 
-void RestMeter::add(const wire_packet &packet) {
+void BaselineMeter::add(const wire_packet &packet) {
   if (packet.type == WIRE_SYNC) {
     edges_.take(packet.body.sync);
   }
@@ -90,10 +90,10 @@ void RestMeter::add(const wire_packet &packet) {
   readings_.push_back(reading);
 }
 
-double RestMeter::seconds() const { return any_ ? static_cast<double>(last_us_ - first_us_) * 1e-6 : 0; }
+double BaselineMeter::seconds() const { return any_ ? static_cast<double>(last_us_ - first_us_) * 1e-6 : 0; }
 
 /* From each reading to the next, [reading - 1]. */
-std::vector<double> RestMeter::steps_together() const {
+std::vector<double> BaselineMeter::steps_together() const {
   std::vector<double> together;
   std::vector<double> steps_Pa;
   for (std::size_t i = 1; i < readings_.size(); i++) {
@@ -108,7 +108,7 @@ std::vector<double> RestMeter::steps_together() const {
   return together;
 }
 
-std::optional<double> RestMeter::noise(unsigned sensor, const std::vector<double> &together) const {
+std::optional<double> BaselineMeter::noise(unsigned sensor, const std::vector<double> &together) const {
   std::vector<double> steps_Pa;
   double squares = 0;
   for (std::size_t i = 1; i < readings_.size(); i++) {
@@ -125,21 +125,21 @@ std::optional<double> RestMeter::noise(unsigned sensor, const std::vector<double
                                       : median(steps_Pa) * NOISE_OF_MEDIAN_STEP;
 }
 
-Rest RestMeter::result() const {
-  Rest rest = counted_;
-  rest.seconds = seconds();
-  rest.frames_made = last_frame_ - first_frame_;
-  rest.edges = edges_.edges();
-  rest.edges_missing = edges_.missing();
+Baseline BaselineMeter::result() const {
+  Baseline baseline = counted_;
+  baseline.seconds = seconds();
+  baseline.frames_made = last_frame_ - first_frame_;
+  baseline.edges = edges_.edges();
+  baseline.edges_missing = edges_.missing();
   auto together = steps_together();
   std::vector<Means> means(sensor_count_);
   for (unsigned k = 0; k < sensor_count_; k++) {
-    SensorAtRest sensor;
+    SensorBaseline sensor;
     std::array<double, MEANS> sums{}, counts{};
     double sum_Pa = 0;
     for (const Reading &reading : readings_) {
       if (has(reading.valid, k)) {
-        auto i = static_cast<std::size_t>(reading.t_s / std::max(rest.seconds, 1e-6) * MEANS);
+        auto i = static_cast<std::size_t>(reading.t_s / std::max(baseline.seconds, 1e-6) * MEANS);
         i = std::min<std::size_t>(i, MEANS - 1);
         sums[i] += static_cast<double>(reading.pressure_Pa[k]);
         counts[i]++;
@@ -162,7 +162,7 @@ Rest RestMeter::result() const {
       }
     }
     sensor.noise_Pa = noise(k, together);
-    rest.sensors.push_back(sensor);
+    baseline.sensors.push_back(sensor);
   }
   Means common;
   for (unsigned i = 0; i < MEANS; i++) {
@@ -181,11 +181,11 @@ Rest RestMeter::result() const {
       }
     }
   }
-  rest.common_drift = slope(common, rest.seconds);
+  baseline.common_drift = slope(common, baseline.seconds);
   for (unsigned k = 0; k < sensor_count_; k++) {
-    rest.sensors[k].drift = slope(means[k], rest.seconds);
+    baseline.sensors[k].drift = slope(means[k], baseline.seconds);
   }
-  return rest;
+  return baseline;
 }
 
 } // namespace fingertip

@@ -18,7 +18,7 @@ struct Slope {
   double Pa_per_s, sd_Pa_per_s;
 };
 
-struct SensorAtRest {
+struct SensorBaseline {
   std::size_t readings = 0;
   double valid_share = 0;     /* of the frames that measured pressures */
   double doubtful_share = 0;  /* the same */
@@ -28,24 +28,24 @@ struct SensorAtRest {
   std::optional<Slope> drift;
 };
 
-struct Rest {
+struct Baseline {
   double seconds = 0;             /* device time from the first frame to the last */
   std::uint32_t frames_made = 0;  /* in that time, by their numbers */
   std::size_t frames_touched = 0; /* of those received: in contact */
   std::size_t frames_received = 0;
   std::uint32_t last_flags = 0;               /* enum contact_flag */
-  std::vector<SensorAtRest> sensors;          /* none where no readings are streamed */
+  std::vector<SensorBaseline> sensors;        /* none where no readings are streamed */
   std::optional<Slope> common_drift;          /* of all sensors together */
   std::uint64_t edges = 0, edges_missing = 0; /* at the sync pin, by EdgeCounter */
 };
 
-class RestMeter {
+class BaselineMeter {
 public:
   /* Contact, raw and sync packets, in order; others are nothing to it. */
   void add(const wire_packet &packet);
 
   double seconds() const;
-  Rest result() const;
+  Baseline result() const;
 
 private:
   struct Reading {
@@ -60,7 +60,7 @@ private:
   bool any_ = false;
   std::uint64_t first_us_ = 0, last_us_ = 0;
   std::uint32_t first_frame_ = 0, last_frame_ = 0;
-  Rest counted_;
+  Baseline counted_;
   std::uint8_t sensor_count_ = 0;
   EdgeCounter edges_;
   std::vector<Reading> readings_;

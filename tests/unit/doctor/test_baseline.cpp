@@ -1,13 +1,13 @@
 #include "support/host_packets.hpp"
-#include "tool/doctor/rest.hpp"
+#include "tool/doctor/baseline.hpp"
 
 #include <cmath>
 #include <functional>
 #include <gtest/gtest.h>
 #include <random>
 
-using fingertip::Rest;
-using fingertip::RestMeter;
+using fingertip::Baseline;
+using fingertip::BaselineMeter;
 
 constexpr unsigned SENSORS = 15;
 constexpr double NOISE_Pa = 4;
@@ -22,10 +22,10 @@ struct Pad {
   Pad() { std::fill_n(noise_Pa, SENSORS, NOISE_Pa); }
 };
 
-static Rest measure(const Pad &pad, const Signal &signal, double seconds = 10, double rate_Hz = 200) {
+static Baseline measure(const Pad &pad, const Signal &signal, double seconds = 10, double rate_Hz = 200) {
   std::mt19937 random(20260101);
   std::normal_distribution<double> gaussian;
-  RestMeter meter;
+  BaselineMeter meter;
   auto frames = static_cast<std::uint32_t>(seconds * rate_Hz) + 1;
   for (std::uint32_t i = 0; i < frames; i++) {
     double t_s = i / rate_Hz;
@@ -49,8 +49,8 @@ static Rest measure(const Pad &pad, const Signal &signal, double seconds = 10, d
 
 static double nothing(unsigned, double) { return 0; }
 
-TEST(Rest, EdgesAndThoseThatAreMissing) {
-  RestMeter meter;
+TEST(Baseline, EdgesAndThoseThatAreMissing) {
+  BaselineMeter meter;
   for (std::uint32_t number : {7u, 8u, 11u}) {
     wire_packet edge{};
     edge.type = WIRE_SYNC;
@@ -62,79 +62,79 @@ TEST(Rest, EdgesAndThoseThatAreMissing) {
   EXPECT_EQ(meter.result().edges_missing, 2u);
 }
 
-TEST(Rest, NoiseOfEachSensorWhateverTheOthersDo) {
+TEST(Baseline, NoiseOfEachSensorWhateverTheOthersDo) {
   Pad pad;
   pad.noise_Pa[7] = 40;
   for (bool touched : {false, true}) {
     pad.flags = CONTACT_FLAG_TARED | (touched ? CONTACT_FLAG_CONTACT : 0);
-    Rest rest = measure(pad, nothing);
-    ASSERT_EQ(rest.sensors.size(), SENSORS);
+    Baseline baseline = measure(pad, nothing);
+    ASSERT_EQ(baseline.sensors.size(), SENSORS);
     for (unsigned k = 0; k < SENSORS; k++) {
-      EXPECT_NEAR(*rest.sensors[k].noise_Pa / pad.noise_Pa[k], 1, touched ? 0.2 : 0.08) << k;
+      EXPECT_NEAR(*baseline.sensors[k].noise_Pa / pad.noise_Pa[k], 1, touched ? 0.2 : 0.08) << k;
     }
   }
 }
 
-TEST(Rest, MovesOfTheAirAreNoNoiseAndNoDriftOfASensor) {
-  Rest rest = measure(Pad(), [](unsigned, double t_s) { return 200 * std::sin(40 * t_s) + 30 * t_s; });
-  for (const auto &sensor : rest.sensors) {
+TEST(Baseline, MovesOfTheAirAreNoNoiseAndNoDriftOfASensor) {
+  Baseline baseline = measure(Pad(), [](unsigned, double t_s) { return 200 * std::sin(40 * t_s) + 30 * t_s; });
+  for (const auto &sensor : baseline.sensors) {
     EXPECT_NEAR(*sensor.noise_Pa / NOISE_Pa, 1, 0.08);
     EXPECT_LT(std::abs(sensor.drift->Pa_per_s), 0.2);
   }
-  EXPECT_NEAR(rest.common_drift->Pa_per_s, 30, 2);
+  EXPECT_NEAR(baseline.common_drift->Pa_per_s, 30, 2);
 }
 
-TEST(Rest, DriftOfOneSensorWithItsStandardDeviation) {
-  Rest rest = measure(Pad(), [](unsigned k, double t_s) { return k == 4 ? -2 * t_s : 0; });
+TEST(Baseline, DriftOfOneSensorWithItsStandardDeviation) {
+  Baseline baseline = measure(Pad(), [](unsigned k, double t_s) { return k == 4 ? -2 * t_s : 0; });
   for (unsigned k = 0; k < SENSORS; k++) {
-    const auto &drift = *rest.sensors[k].drift;
+    const auto &drift = *baseline.sensors[k].drift;
     EXPECT_LT(std::abs(drift.Pa_per_s + (k == 4 ? 2 : 0)), 5 * drift.sd_Pa_per_s) << k;
     EXPECT_LT(drift.sd_Pa_per_s, 0.1) << k;
   }
 }
 
-TEST(Rest, CountsFramesTouchedDoubtfulAndMissing) {
+TEST(Baseline, CountsFramesTouchedDoubtfulAndMissing) {
   Pad pad;
   pad.flags = CONTACT_FLAG_TARED | CONTACT_FLAG_CONTACT;
   pad.valid = 0x7FFF & ~(1u << 9);
-  Rest rest = measure(pad, nothing, 2, 100);
-  EXPECT_NEAR(rest.seconds, 2, 1e-6);
-  EXPECT_EQ(rest.frames_made, 200u);
-  EXPECT_EQ(rest.frames_received, 201u);
-  EXPECT_EQ(rest.frames_touched, 201u);
-  EXPECT_EQ(rest.last_flags, pad.flags);
-  EXPECT_EQ(rest.sensors[9].readings, 0u);
-  EXPECT_EQ(rest.sensors[9].valid_share, 0);
-  EXPECT_FALSE(rest.sensors[9].noise_Pa);
-  EXPECT_FALSE(rest.sensors[9].drift);
-  EXPECT_EQ(rest.sensors[8].valid_share, 1);
-  EXPECT_NEAR(rest.sensors[8].mean_Pa, 101325 + 8000, 2);
-  EXPECT_NEAR(rest.sensors[3].doubtful_share, 0.5, 0.01);
+  Baseline baseline = measure(pad, nothing, 2, 100);
+  EXPECT_NEAR(baseline.seconds, 2, 1e-6);
+  EXPECT_EQ(baseline.frames_made, 200u);
+  EXPECT_EQ(baseline.frames_received, 201u);
+  EXPECT_EQ(baseline.frames_touched, 201u);
+  EXPECT_EQ(baseline.last_flags, pad.flags);
+  EXPECT_EQ(baseline.sensors[9].readings, 0u);
+  EXPECT_EQ(baseline.sensors[9].valid_share, 0);
+  EXPECT_FALSE(baseline.sensors[9].noise_Pa);
+  EXPECT_FALSE(baseline.sensors[9].drift);
+  EXPECT_EQ(baseline.sensors[8].valid_share, 1);
+  EXPECT_NEAR(baseline.sensors[8].mean_Pa, 101325 + 8000, 2);
+  EXPECT_NEAR(baseline.sensors[3].doubtful_share, 0.5, 0.01);
 }
 
-TEST(Rest, HeldFramesAreNoReadings) {
-  RestMeter meter;
+TEST(Baseline, HeldFramesAreNoReadings) {
+  BaselineMeter meter;
   for (std::uint32_t i = 0; i < 100; i++) {
     wire_packet raw = test::make_raw(0, i * 10000, i);
     raw.body.raw.valid = 0x7FFF;
     raw.body.raw.flags = i % 2 ? CONTACT_FLAG_HELD : 0;
     meter.add(raw);
   }
-  Rest rest = meter.result();
-  EXPECT_EQ(rest.frames_received, 100u);
-  EXPECT_EQ(rest.sensors[0].readings, 50u);
-  EXPECT_EQ(rest.sensors[0].valid_share, 1);
+  Baseline baseline = meter.result();
+  EXPECT_EQ(baseline.frames_received, 100u);
+  EXPECT_EQ(baseline.sensors[0].readings, 50u);
+  EXPECT_EQ(baseline.sensors[0].valid_share, 1);
 }
 
-TEST(Rest, NothingOrOneFrameIsNoMeasurement) {
-  RestMeter meter;
+TEST(Baseline, NothingOrOneFrameIsNoMeasurement) {
+  BaselineMeter meter;
   EXPECT_EQ(meter.result().frames_made, 0u);
   meter.add(test::make_health(0, 5));
   EXPECT_EQ(meter.result().frames_received, 0u);
   meter.add(test::make_raw(0, 5, 1));
-  Rest rest = meter.result();
-  EXPECT_EQ(rest.frames_received, 1u);
-  EXPECT_EQ(rest.frames_made, 0u);
-  EXPECT_FALSE(rest.sensors.at(1).noise_Pa);
-  EXPECT_FALSE(rest.sensors.at(1).drift);
+  Baseline baseline = meter.result();
+  EXPECT_EQ(baseline.frames_received, 1u);
+  EXPECT_EQ(baseline.frames_made, 0u);
+  EXPECT_FALSE(baseline.sensors.at(1).noise_Pa);
+  EXPECT_FALSE(baseline.sensors.at(1).drift);
 }
