@@ -4,13 +4,12 @@
 errors.py NAME=SUMMARY.json...
 """
 
-import argparse
 import json
 import pathlib
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
-from fingertip.command import InputError, run_tool  # noqa: E402
+from fingertip.command import InputError, Parser, run_tool  # noqa: E402
 
 ROWS = [
     ("frames a second", lambda s: f"{s['frames_per_s']:.0f}"),
@@ -25,7 +24,7 @@ ROWS = [
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(description=__doc__)
     parser.add_argument("summaries", nargs="+", metavar="NAME=SUMMARY.json")
     summaries = {}
     for text in parser.parse_args(argv).summaries:

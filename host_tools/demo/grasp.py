@@ -6,7 +6,6 @@
 RECORDING.csv: of fingertip grasp; TRUTH.csv: of fingertip simulate --lift.
 """
 
-import argparse
 import pathlib
 import sys
 
@@ -17,7 +16,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "python"))
-from fingertip.command import check_output, run_tool  # noqa: E402
+from fingertip.command import Parser, check_output, run_tool  # noqa: E402
 from fingertip.files import InputError, read_lines  # noqa: E402
 from fingertip.grip_file import read_grip  # noqa: E402
 from fingertip.plot import FAINT, INK, MEASURED, SLIPPING, TRUTH, set_style, spans, write_figure  # noqa: E402
@@ -100,7 +99,7 @@ def draw(grip, t_s, truth, truth_s, slips, happened):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(description=__doc__)
     parser.add_argument("recording", metavar="RECORDING.csv")
     parser.add_argument("truth", metavar="TRUTH.csv")
     parser.add_argument("-o", "--output", required=True, metavar="FILE.png")

@@ -22,7 +22,6 @@ So is that of a grasp there, recorded for seven seconds by the commands of host_
     /usr/bin/python3 host_tools/demo/picture.py grasp.csv --at 0.6 --until 5.4 --every 0.2 -o host_tools/demo/grasp_screen.png
 """
 
-import argparse
 import copy
 import fcntl
 import io
@@ -42,7 +41,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "host_tools/python"))
-from fingertip.command import check_output, run_tool  # noqa: E402
+from fingertip.command import Parser, check_output, run_tool  # noqa: E402
 from fingertip.files import InputError, write_bytes  # noqa: E402
 
 PATIENCE_s = 120
@@ -145,7 +144,7 @@ def png(screens, every_s):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(description=__doc__)
     parser.add_argument("recording", metavar="RECORDING.csv")
     parser.add_argument("-o", "--output", required=True, metavar="FILE.png")
     parser.add_argument("--device", metavar="SERIAL", help="one of several fingertips in the recording")

@@ -5,21 +5,32 @@
 --help after a command has its options.
 """
 
+import functools
 import importlib
+import pathlib
 import sys
 from collections.abc import Callable
-from typing import Any
+
+from .command import run_tool
 
 COMMANDS = ("plot", "scenario", "evaluate", "fit", "validate", "ros2", "ros2_gripper", "bridge", "recorder")
 
 
-def command() -> Callable[[], Any]:
+def _tool(name: str) -> Callable[[], int]:
+    says = {"fit": "fingertip fit", "validate": "fingertip"}.get(name, f"fingertip-{name.replace('_', '-')}")
+    return functools.partial(run_tool, says, importlib.import_module(f"fingertip.{name}").main)
+
+
+def command() -> Callable[[], int]:
     """What the first word names, which is taken out of sys.argv."""
     if len(sys.argv) < 2 or sys.argv[1] not in COMMANDS:
         sys.exit(__doc__)
-    named: Callable[[], Any] = importlib.import_module(f"fingertip.{sys.argv[1]}").command
-    del sys.argv[1]
-    return named
+    return _tool(sys.argv.pop(1))
+
+
+def installed() -> int:
+    """What the program's name names."""
+    return _tool(pathlib.PurePath(sys.argv[0]).stem.removeprefix("fingertip-").replace("-", "_"))()
 
 
 if __name__ == "__main__":

@@ -6,18 +6,16 @@ waited for. It listens on this computer alone, unless --listen, --connect or --c
 In Python, because the package reconnects, finds and shares fingertips already, and Debian has no Zenoh for C++.
 """
 
-import argparse
 import collections
 import concurrent.futures
 import contextlib
-import functools
 import json
 import os
 import pathlib
 import platform
 
 from . import discovery, host_time, wire
-from .command import check_range, printable, reporter, run_tool
+from .command import Parser, check_range, printable, reporter
 from .device import Fingertip
 from .errors import FingertipError, InputError
 from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, host_clock, open_session, settings_of, until_ended, zenoh_module
@@ -264,7 +262,7 @@ class Bridge:
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(prog="fingertip-bridge", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog="fingertip-bridge", description=__doc__)
     add, keep = (
         parser.add_argument,
         "packets of each fingertip that are kept for recorders that missed them, some 0.4 kB each; default 100000",
@@ -291,6 +289,3 @@ def main(argv):
         finally:
             bridge.close()
     return 0
-
-
-command = functools.partial(run_tool, "fingertip-bridge", main)

@@ -1,15 +1,31 @@
 """What the commands share: their errors, their progress, their options' ranges, and where they may write."""
 
+import argparse
 import contextlib
 import os
 import sys
 from collections.abc import Callable, Iterator
+from typing import Any, NoReturn
 
 from . import host_time
 from .errors import FingertipError, InputError
 
 Path = str | os.PathLike[str]
 WORTH_SHOWING_s, LINES_s = 2.0, 10.0  # of a progress
+
+
+class WrongUsage(InputError):
+    status = 2
+
+
+class Parser(argparse.ArgumentParser):
+    """Keeps the lines of a description, and says in one what is wrong."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"formatter_class": argparse.RawDescriptionHelpFormatter, **options})
+
+    def error(self, message: str) -> NoReturn:
+        raise WrongUsage(f"{printable(message).removeprefix('argument ')}; see {self.prog} --help")
 
 
 def run_tool(name: str, main: Callable[[list[str]], int]) -> int:

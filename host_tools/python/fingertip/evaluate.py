@@ -28,15 +28,13 @@ between the scenario's rows. Frames whose time falls between a row with and a ro
     emulator_warnings          of the run report
 """
 
-import argparse
-import functools
 import json
 import math
 import sys
 
 import numpy as np
 
-from .command import check_output, printable, progress, run_tool
+from .command import Parser, check_output, printable, progress
 from .files import CONTACT, FIT_VALID, SLIP, SLIP_VALID, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, InputError
 from .files import read_recording, read_run, read_scenario, recorded_devices, restart_rows, write_text
 
@@ -174,7 +172,7 @@ def check_time(recording):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(prog="fingertip-evaluate", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog="fingertip-evaluate", description=__doc__)
     parser.add_argument("recording", metavar="RECORDING.csv")
     parser.add_argument("scenario", metavar="SCENARIO.csv")
     parser.add_argument("--run", metavar="run.json", help="the emulator's report")
@@ -187,6 +185,3 @@ def main(argv):
     comparison = Comparison(recording, read_scenario(options.scenario), read_run(options.run))
     write_text(options.output, json.dumps(comparison.summary, indent=2) + "\n")
     return 0
-
-
-command = functools.partial(run_tool, "fingertip-evaluate", main)

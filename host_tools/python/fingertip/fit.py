@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .arrays import Firmware, MeasureError, q10, round_half_away, table_of, usable_of
-from .command import check_output, printable, progress, reporter, run_tool
+from .command import Parser, check_output, printable, progress, reporter
 from .errors import InputError
 from .evaluate import add_recording_options, check_time, load_recording
 from .files import is_recording, write_text
@@ -502,7 +502,7 @@ def _rises(values: FloatArray) -> bool:
 
 
 def main(argv: list[str]) -> int:
-    parser = argparse.ArgumentParser(prog="fingertip fit", description=(__doc__ or "").split(":")[0] + ".", allow_abbrev=False)
+    parser = Parser(prog="fingertip fit", description=(__doc__ or "").split(":")[0] + ".", allow_abbrev=False)
     parser.add_argument(
         "recording", metavar="FILE.csv", help="a column for each sensor, perhaps one of the time before; or a recording; -: standard input"
     )
@@ -554,6 +554,3 @@ def _texts(values: npt.NDArray[Any], name: str) -> list[str]:
     """Empty where there is none."""
     texts = (repr(value) if name == "t_s" or isinstance(value, int) else f"{value:.9g}" for value in values.tolist())
     return ["" if text == "nan" else text for text in texts]
-
-
-command = functools.partial(run_tool, "fingertip fit", main)

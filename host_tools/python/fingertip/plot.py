@@ -6,7 +6,6 @@ With --beside it draws what another fingertip of the recording measured of the s
 """
 
 import argparse
-import functools
 import io
 import sys
 
@@ -20,7 +19,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.patches import FancyBboxPatch
 
-from .command import check_output, run_tool
+from .command import Parser, check_output
 from .evaluate import Comparison, add_recording_options, check_time, load_recording
 from .files import FIT_VALID, MOVING, SLIDING, SLIP, STAGES, TANGENTIAL_FROM_TOUCH, TANGENTIAL_VALID, WARNINGS, InputError
 from .files import read_run, read_scenario, recorded_devices, restart_rows, write_bytes
@@ -340,7 +339,7 @@ def header(recording, comparison, t_s, simulated, beside):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(prog="fingertip-plot", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog="fingertip-plot", description=__doc__)
     parser.add_argument("recording", metavar="RECORDING.csv")
     parser.add_argument("--truth", metavar="SCENARIO.csv", help="the scenario that was played")
     parser.add_argument("--run", metavar="run.json", help="the emulator's report: the recording is of simulated sensors")
@@ -409,6 +408,3 @@ def main(argv):
     write_figure(figure, options.output)
     print(f"{options.output}: {lines[1]}")
     return 0
-
-
-command = functools.partial(run_tool, "fingertip-plot", main)

@@ -5,8 +5,6 @@ file too. It ends by Ctrl-C or --seconds.
 Exit status: 0 nothing was lost, 3 something was, and is counted, 1 an error.
 """
 
-import argparse
-import functools
 import itertools
 import json
 import math
@@ -15,7 +13,7 @@ from typing import NamedTuple
 
 from . import host_time, wire
 from .clock import ClockEstimate
-from .command import check_output, check_range, reporter, run_tool
+from .command import Parser, check_output, check_range, reporter
 from .errors import InputError, PacketError
 from .network import AGAIN_MOST, ROOT, Stamp, add_session_options, open_session, parts_of, until_ended, zenoh_module
 from .line import Capability
@@ -485,7 +483,7 @@ def judge_clocks(session, serials, bound_us, may_be_undisciplined):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(prog="fingertip-recorder", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog="fingertip-recorder", description=__doc__)
     add = parser.add_argument
     add("file", metavar="FILE.mcap|FILE.csv")
     add("--serial", action="append", default=[], metavar="SERIAL", help="this fingertip; several times for several; without, all")
@@ -524,6 +522,3 @@ def main(argv):
     if options.json:
         print(json.dumps({"fingertips": figures, "damaged": recording.damaged, "unrecorded": sorted(recording.unrecorded)}))
     return 3 if any(each["lost"] or each["restarts"] or each["unread_frames"] or each["unheard"] for each in figures.values()) else 0
-
-
-command = functools.partial(run_tool, "fingertip-recorder", main)

@@ -8,8 +8,6 @@ ROS_DOMAIN_ID, ROS_LOCALHOST_ONLY=1 and ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST 
 Fast DDS and rosbags.
 """
 
-import argparse
-import functools
 import math
 import os
 import threading
@@ -18,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import host_time
 from .closing import Closing
-from .command import check_range, run_tool
+from .command import Parser, check_range
 from .device import Fingertip
 from .errors import BadValueError, FingertipError
 from .frames import Q10, Frame
@@ -198,7 +196,7 @@ def publish(publisher: Publisher, fingertips: Fingertips, is_over: Callable[[], 
 
 def main(argv: list[str]) -> int:
     description = "Publishes what fingertips measure on topics of ROS 2, without ROS."
-    parser = argparse.ArgumentParser(prog="fingertip-ros2", description=description)
+    parser = Parser(prog="fingertip-ros2", description=description)
     parser.add_argument("--device", action="append", metavar="SERIAL", help="a fingertip; all that are there, if none is named")
     parser.add_argument("--port", action="append", metavar="PORT", help="the same, by its serial port")
     parser.add_argument("--domain", type=int, metavar="N", help="0 to 232; as ROS_DOMAIN_ID has it, if not given")
@@ -217,6 +215,3 @@ def main(argv: list[str]) -> int:
             print(f"{serial}: {frames} frames, lost {tip.statistics.dropped_packets + tip.overrun_frames}")
         print("".join(f"{name}: {count} messages\n" for name, count in publisher.sent.items()) + f"refused: {publisher.refused}")
     return 0
-
-
-command = functools.partial(run_tool, "fingertip-ros2", main)

@@ -12,7 +12,6 @@ import importlib
 import math
 from typing import Any
 
-from .command import run_tool
 from .errors import FingertipError, InputError
 from .running_grasp import RunningGrasp
 
@@ -189,6 +188,3 @@ def main(argv: list[str]) -> int:
     with contextlib.suppress(KeyboardInterrupt, _ros("rclpy.executors").ExternalShutdownException):
         rclpy.spin(node)
     return 0
-
-
-command = functools.partial(run_tool, "fingertip-ros2-gripper", main)

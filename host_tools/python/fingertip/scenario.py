@@ -10,12 +10,9 @@ The pressure is the Gaussian of De Clercq et al., RA-L 2022, eq. (2), and the fo
 while the contact moves faster than 10 mm/s. The same name, length and seed give the same bytes. The file format is described in files.py.
 """
 
-import argparse
-import functools
-
 import numpy as np
 
-from .command import check_output, check_range, run_tool
+from .command import Parser, check_output, check_range
 from .files import SENSOR_X_mm, SENSOR_Y_mm, SLIP_SPEED_mm_s, InputError, write_scenario
 
 STEP_s = 1e-3
@@ -137,7 +134,7 @@ SCENARIOS = {
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(prog="fingertip-scenario", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog="fingertip-scenario", description=__doc__)
     parser.add_argument("name", choices=sorted(SCENARIOS), metavar="NAME", help=", ".join(sorted(SCENARIOS)))
     parser.add_argument("-o", "--output", required=True, metavar="FILE.csv")
     parser.add_argument("--seconds", type=float, metavar="S", help="length; default: that of the scenario")
@@ -161,6 +158,3 @@ def main(argv):
     }
     write_scenario(options.output, metadata, motion.columns())
     return 0
-
-
-command = functools.partial(run_tool, "fingertip-scenario", main)

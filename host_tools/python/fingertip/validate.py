@@ -2,13 +2,11 @@
 
 import argparse
 import contextlib
-import functools
 import json
 import math
 import re
 
-from .command import check_output, printable, run_tool
-from .errors import InputError
+from .command import Parser, WrongUsage, check_output, printable
 from .files import SENSOR_X_mm, SENSOR_Y_mm, PITCH_mm, read_lines, write_text
 from .validation.assess import Card
 from .validation.card import card_html, card_json
@@ -21,15 +19,6 @@ from .version import __version__
 NAME = "fingertip validate"
 SKIN_mm = 12.0
 _LIVE = ("weight", "skin", "pull", "thread_height", "record", "serial")  # of these none with --from, and with --template nothing at all
-
-
-class WrongUsage(InputError):
-    status = 2
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message):
-        raise WrongUsage(f"{printable(message).removeprefix('argument ')}; see {NAME} --help")
 
 
 def _number(low, high, unit):
@@ -51,7 +40,7 @@ def _name(text):
 
 
 def _parser():
-    parser = _Parser(prog=NAME, description=__doc__.split(":")[0] + ".", allow_abbrev=False, usage=f"{NAME} [OPTIONS]")
+    parser = Parser(prog=NAME, description=__doc__.split(":")[0] + ".", allow_abbrev=False, usage=f"{NAME} [OPTIONS]")
     parser.formatter_class = lambda prog: argparse.HelpFormatter(prog, max_help_position=28, width=80)
 
     def add(*names, help, number=(_name, ""), **more):
@@ -138,7 +127,7 @@ def _print(card):
             print(text)
 
 
-def run(argv):
+def main(argv):
     """Exit status."""
     options = _options(argv)
     outputs = [options.template, options.output, options.figures, options.record, options.form]
@@ -163,6 +152,3 @@ def run(argv):
         write_text(options.form, re.sub(r"\{(\w+)\}", lambda key: known.get(key[1], "not measured"), form))
     _print(card)
     return 0
-
-
-command = functools.partial(run_tool, "fingertip", run)

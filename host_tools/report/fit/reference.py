@@ -7,7 +7,6 @@ Readings are above each sensor's zero and over the gains of a calibrated fingert
 sensors were measured, has none. condition_number and observable are of compared.cpp.
 """
 
-import argparse
 import pathlib
 import sys
 
@@ -16,7 +15,7 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools" / part) for part in ("report/measure", "python")]
 import presses  # noqa: E402
-from fingertip.command import check_range, run_tool  # noqa: E402
+from fingertip.command import Parser, check_range, run_tool  # noqa: E402
 from fingertip.files import InputError, read_recording  # noqa: E402
 from measure import Measure, usable_of  # noqa: E402
 
@@ -36,7 +35,7 @@ def readings_Pa(path):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(prog="reference.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog="reference.py", description=__doc__)
     parser.add_argument("--build", default=ROOT / "build/host", metavar="DIR", help="build folder of the host tools (default: %(default)s)")
     parser.add_argument("file", metavar="FILE", help="the recording")
     parser.add_argument("--noise", type=float, default=5.0, metavar="PA", help="of a sensor, rms; default 5")

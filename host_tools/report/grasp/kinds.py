@@ -4,14 +4,13 @@
 kinds.py --build build/host --kind usual,rough --set margin=1.4       # one set of them, to tune the controller by
 """
 
-import argparse
 import json
 import pathlib
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from fingertip.command import run_tool  # noqa: E402
+from fingertip.command import Parser, run_tool  # noqa: E402
 from presentation import BLUE, GOAL, ORANGE  # noqa: E402
 from reporting import built, figures_printed  # noqa: E402
 
@@ -260,7 +259,7 @@ def measure(options, steps):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(description=__doc__)
     parser.add_argument("--build", required=True, metavar="DIR")
     options, more = parser.parse_known_args(argv)
     each = found_by(options.build, *more)["each"]

@@ -7,7 +7,6 @@
 The images are those of the tests: ctest --test-dir build/host -R 'checks.scene_.*_builds'
 """
 
-import argparse
 import pathlib
 import sys
 import tempfile
@@ -16,7 +15,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python"), str(ROOT / "host_tools/report/rate")]
 import scenes  # noqa: E402
 from emulated import FROM_s, Measurement, Tools, distribution, scenario  # noqa: E402
-from fingertip.command import run_tool  # noqa: E402
+from fingertip.command import Parser, run_tool  # noqa: E402
 from fingertip.files import InputError, write_text  # noqa: E402
 from grasp_rate import PAD  # noqa: E402
 from presentation import table_md  # noqa: E402
@@ -102,7 +101,7 @@ def differences(found, expected):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(description=__doc__)
     parser.add_argument("--build", required=True, metavar="DIR", help="build folder of the host tools")
     parser.add_argument("--check", action="store_true", help="compare words and sizes with the table instead of writing it")
     options = parser.parse_args(argv)

@@ -8,14 +8,13 @@ Medians over touches anywhere on the array, 1 to 10 N, of seven objects, on 12 m
 10 %. Calibrated: with twenty placements of a known weight. Pulled: along the rubber by 0.3 of the force. Rubber does not relax here.
 """
 
-import argparse
 import pathlib
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / part) for part in ("host_tools/report/shared", "host_tools/report/measure", "host_tools/python")]
 import static  # noqa: E402
-from fingertip.command import InputError, run_tool  # noqa: E402
+from fingertip.command import InputError, Parser, run_tool  # noqa: E402
 from reporting import contacts_of  # noqa: E402
 
 PADS = 200
@@ -94,7 +93,7 @@ def filled(path, text):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(description=__doc__)
     parser.add_argument("--build", required=True, type=pathlib.Path, metavar="DIR")
     parser.add_argument("--check", action="store_true")
     options = parser.parse_args(argv)

@@ -5,7 +5,6 @@ cards.py --build build/host            writes expected.json of the package: the 
 cards.py --build build/host --check    exit status 1 if that file is not what would be written
 """
 
-import argparse
 import concurrent.futures
 import json
 import math
@@ -18,7 +17,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/report/shared"), str(ROOT / "host_tools/python")]
-from fingertip.command import InputError, run_tool  # noqa: E402
+from fingertip.command import InputError, Parser, run_tool  # noqa: E402
 from reporting import built  # noqa: E402
 
 PACKAGE = ROOT / "host_tools/python"
@@ -181,7 +180,7 @@ def table_text(build):
 
 
 def main(argv):
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(description=__doc__)
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build/host", metavar="FOLDER", help="of the programs")
     parser.add_argument("--check", action="store_true", help="write nothing")
     options = parser.parse_args(argv)

@@ -1,7 +1,6 @@
 """Scenarios, evaluation and plots on data whose answer is known."""
 
 import contextlib
-import importlib
 import io
 import itertools
 import json
@@ -25,6 +24,7 @@ sys.path.insert(0, str(TOOLS))
 
 from fingertip import Flag, cells, command, files  # noqa: E402
 from fingertip import plot  # noqa: E402
+from fingertip.__main__ import installed  # noqa: E402
 from fingertip.columns import Columns  # noqa: E402
 from fingertip.wire import Health  # noqa: E402
 
@@ -84,13 +84,12 @@ class ToolTest(unittest.TestCase):
     def tool(self, name, *arguments, status=0):
         """What the console command does and says, in this process: a Python with matplotlib takes half a second to start."""
         stdout, stderr = io.StringIO(), io.StringIO()
-        command = importlib.import_module(f"fingertip.{name}").command
         with (
-            mock.patch.object(sys, "argv", [name, *map(str, arguments)]),
+            mock.patch.object(sys, "argv", [f"bin/fingertip-{name.replace('_', '-')}", *map(str, arguments)]),
             contextlib.redirect_stdout(stdout),
             contextlib.redirect_stderr(stderr),
         ):
-            found = command()
+            found = installed()
         plot.plt.close("all")
         self.assertEqual(found, status, stderr.getvalue())
         return subprocess.CompletedProcess(name, found, stdout.getvalue(), stderr.getvalue())
@@ -506,6 +505,7 @@ class TangentialLoad(ToolTest):
         other = self.folder / "other.csv"
         shutil.copy(self.recording(scenario, change=lambda row: {**row, "force_N": 0.8 * row["force_N"]}), other)
         one = self.recording(scenario)
+        self.assertRegex(self.tool("plot", status=2).stderr, r"\Afingertip-plot: .* -o/--output; see fingertip-plot --help\n\Z")
         self.assertIn("--beside compares with a truth", self.error("plot", one, "--beside", "AAAA", "-o", self.folder / "p.png"))
         load = lambda options, **how: files.read_recording(other if options.device == "BBBB" else one)
         beside = ("--beside", "BBBB", "--beside-name", "never calibrated", "--beside-run", self.run_report())

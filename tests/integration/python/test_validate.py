@@ -26,7 +26,7 @@ import numpy as np
 FINGERTIP, SIMULATED_PAD, SIMULATE, TIME_KEEPER, TABLES = (os.path.abspath(path) for path in sys.argv[1:6])
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT / "host_tools/python"), str(ROOT / "tests/support")]
-from fingertip import Fingertip, host_time, validate  # noqa: E402
+from fingertip import Fingertip, command, host_time, validate  # noqa: E402
 from fingertip.files import PITCH_mm, SENSOR_X_mm, SENSOR_Y_mm  # noqa: E402
 from fingertip.fit import firmware  # noqa: E402
 from fingertip.line import Capability  # noqa: E402
@@ -269,7 +269,7 @@ class ValidateTest(unittest.TestCase):
         """Output and errors."""
         argv = mock.patch.object(sys, "argv", ["", *arguments])
         with argv, contextlib.redirect_stdout(io.StringIO()) as out, contextlib.redirect_stderr(io.StringIO()) as err:
-            ended = validate.command()
+            ended = command.run_tool("fingertip", validate.main)
         self.assertEqual(ended, status, (arguments, out.getvalue(), err.getvalue()))
         return out.getvalue(), err.getvalue()
 
