@@ -196,13 +196,13 @@ DRAWN = {
     "fit": (BLUE, "firmware, fixed point", ("firmware, fixed point", "left", 0)),
     "general": ("#0e9aa7", "firmware, float32, any layout", ("firmware, float32", "left", 0)),
     "naive_float": ("#e08a1e", "Gauss-Newton, expf", ("Gauss-Newton, expf", "left", -5)),
-    "naive_double": ("#b5651d", "Gauss-Newton, exp", ("Gauss-Newton, exp", "left", 5)),
-    "lm_float": ("#a05cc5", "Levenberg-Marquardt, float", ("Levenberg-Marquardt, float", "left", -4)),
-    "lm_double": ("#6f3d94", "Levenberg-Marquardt, double", ("Levenberg-Marquardt, double", "right", -4)),
+    "naive_double": ("#b5651d", "Gauss-Newton, exp", ("Gauss-Newton, exp", "right", -6)),
+    "lm_float": ("#a05cc5", "Levenberg-Marquardt, float", ("Levenberg-Marquardt, float", "left", 2)),
+    "lm_double": ("#6f3d94", "Levenberg-Marquardt, double", ("Levenberg-Marquardt, double", "right", -1)),
     "masked": (INK, None, ("firmware, a sensor masked", "right", 0)),
     "double": (FAINT, None, ("the same steps in double", "right", 0)),
-    "tiny_solver": (INK, None, ("TinySolver", "right", 4)),
-    "ceres_reused": (INK, None, ("Ceres", "right", 0)),
+    "tiny_solver": (INK, None, ("TinySolver", "right", 6)),
+    "ceres_reused": (INK, None, ("Ceres", "left", 0)),
 }
 LOW_um, HIGH_um = 1e-3, 1e5  # what is beyond is drawn there
 
