@@ -25,7 +25,7 @@ OWNED = {
     "OUTLIERS": ([], r"fit_grid_outlier|leave_outlier_out|fit_gaussian_grid_update"),
     "TANGENTIAL_BIAS": (
         ["ft_fit.dir/fit/fit_bias.c.obj", "ft_fit.dir/fit/fit_gains.c.obj", "ft_app.dir/app/uncertainty_stage.c.obj"],
-        r"fit_(doubt|gains)_\w+",
+        r"fit_(bias|gains)_\w+",
     ),
     "SHAPES": (
         ["ft_fit.dir/fit/fit_shapes*.obj", "ft_contact.dir/contact/shapes.c.obj", "ft_app.dir/app/shapes_stage.c.obj"],
