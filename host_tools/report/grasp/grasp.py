@@ -5,7 +5,7 @@
 
     grasp.json    the figures by which it is judged, with their goals; a row for each set of grasps
     grasp.md      the same to read
-    grasp.png     the same to look at, and a slip that is caught
+    grasp.png     the same to look at
 
 The controller is the tool's own; rubber, objects, sensors and grippers are simulated (host_tools/simulation/cell, whose headers state what is
 assumed). The controller's constants were chosen with other seeds (--seed refuses them). In one grasp more the fingertips are emulated boards with

@@ -197,19 +197,6 @@ def figures(rows, sets, shapes, wrong):
     return found | {name: find(ours, sets, wrong) for name, (_, find) in JUDGED.items()}
 
 
-def caught(each):
-    """Number of a grasp and when its slide began: of all slides of 1 mm or more after the lift that were answered within 0.1 s, the one of
-    the median way."""
-    slides = sorted(
-        (slide["way_mm"], one["n"], slide["begin_s"])
-        for one in each
-        if not one["dropped"]
-        for slide in one["catches"]
-        if slide["way_mm"] >= 1 and slide["begin_s"] > one["lift_s"] and (slide["reaction_ms"] or 100) < 100
-    )
-    return slides[len(slides) // 2][1:] if slides else (None, None)
-
-
 def measure(options, steps):
     judged, more = (options.grasps, options.grasps) if options.grasps else (USUAL, USUAL_MORE) if options.usual else (GRASPS, GRASPS_MORE)
     found = {"kinds": [], "shapes": [], "sets": [], "distributions": []}
@@ -231,9 +218,6 @@ def measure(options, steps):
                             "reaction_ms": sorted(reactions(each)),
                         }
                     )
-                    number, begin_s = caught(each)
-                    if "caught" not in found and number is not None:
-                        found["caught"] = {"gripper": gripper, "begin_s": begin_s, **found_by(options.build, *call, "--trace", number)}
             steps.report(f"{gripper}, {name}: {found['kinds'][-1]['grasps']} grasps")
     for name, (arguments, controller) in SETS.items():
         for gripper in GRIPPERS:

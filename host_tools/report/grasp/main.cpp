@@ -144,7 +144,6 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
                     {"shape", name_of(grasp.shape)},
                     {"mass_kg", grasp.mass_kg},
                     {"friction", grasp.pads[0].friction},
-                    {"lift_s", grasp.lift_s},
                     {"dropped", o.dropped},
                     {"never_held", o.never_held},
                     {"crushed", o.crushed},
@@ -164,9 +163,7 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
     line["events"].push_back(name_of(event.kind));
   }
   for (const Slip &slip : o.catches) {
-    line["catches"].push_back({{"begin_s", slip.begin_s},
-                               {"way_mm", slip.way_mm},
-                               {"peak_N", slip.peak_N},
+    line["catches"].push_back({{"peak_N", slip.peak_N},
                                {"least_N", slip.least_N},
                                {"reaction_ms", slip.reaction_s ? ordered_json(1e3 * *slip.reaction_s) : nullptr}});
   }

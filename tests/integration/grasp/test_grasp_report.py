@@ -21,10 +21,6 @@ fault = {"fault": "one fingertip gone", "state": "holding", "gripper": "2f85", "
          "ends": "holding", "opened_mm": 0.3, "peak_N": 3.0, "cap_N": 4.0, "crushed": True, "opened": False, "beyond_cap": False, "unsaid": False}
 if "--faults" in sys.argv:
     found = {"rows": [fault, {**fault, "gripper": "sts3215", "peak_N": 3.5, "crushed": False}, {**fault, "fault": "both frozen", "untold": True, "beyond_cap": True}]}
-elif "--trace" in options:
-    names = ("width_mm", "force_N", "least_N", "load_N", "way_mm", "slid_mm", "slips", "sensed_N")
-    times = [i * 0.002 for i in range(1000)]
-    found = {**grasp, "series": {"t_s": times, "lift_s": [t - 0.3 for t in times], **{name: [1.0] * 1000 for name in names}}}
 else:
     count = int(options["--count"])
     each = [dict(grasp) for _ in range(count)]
@@ -96,7 +92,6 @@ class Grasp(unittest.TestCase):
             [("ball", 20, 2.1), ("cylinder", 40, 2.1), ("box", 20, 3.1), ("plate", 20, 6.1)],
         )
         self.assertAlmostEqual(found["turned_unreported_percent"], 100 / 99, places=2)  # of what was held
-        self.assertEqual(found["caught"]["n"], 7)
         self.assertIsNone(met["emulated_reaction_ms"])
         self.assertEqual((found["cups_crushed"], met["cups_crushed"], met["faults_beyond_cap"]), (1, False, True))
         self.assertEqual(
