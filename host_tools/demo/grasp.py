@@ -22,7 +22,7 @@ from fingertip.grip_file import read_grip  # noqa: E402
 from fingertip.plot import FAINT, INK, MEASURED, SLIPPING, TRUTH, set_style, spans, write_figure  # noqa: E402
 
 SLIP_mm, JOINED_s, MORE_FORCE = 0.3, 0.03, 1.05  # as the cell counts slips, and what is a reaction
-HAPPENINGS = ("lift", "pour", "jerk", "knock", "slick", "push", "vibrate", "carry")
+HAPPENINGS = ("lift", "pour", "knock", "slick", "push", "vibrate", "carry")
 
 
 def read_truth(path):

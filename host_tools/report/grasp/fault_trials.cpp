@@ -56,12 +56,10 @@ constexpr Happening HAPPENINGS[] = {
     {"silent for 1 s", FaultKind::silent, NONE, GRIP_GRIPPER_SILENT, 1.0},
     {"fault 9", FaultKind::fault, NONE, GRIP_GRIPPER_FAULT},
     {"power lost", FaultKind::power, NONE, GRIP_GRIPPER_INACTIVE},
-    {"garbage", FaultKind::garbage, NONE, GRIP_GRIPPER_SILENT},
     {"no answers", FaultKind::unanswered, NONE, GRIP_GRIPPER_SILENT},
     {"no answers for 0.3 s", FaultKind::unanswered, NONE, 0, 0.3},
     {"half is garbage", FaultKind::noisy},
     {"answers 30 ms late", FaultKind::late},
-    {"latency timer, 16 ms", FaultKind::latency_timer},
     {"object gone", FaultKind::taken},
 };
 

@@ -10,7 +10,7 @@ namespace fingertip::cell {
 
 using Kind = Fault::Kind;
 
-constexpr double LATE_s = 0.03, LATENCY_TIMER_s = 0.016;
+constexpr double LATE_s = 0.03;
 constexpr double WRONG_mm = 10.0; // of the location
 constexpr double BOOTS_s = 1.5, MOVED_N = 1.5, LESS = 0.3, SPIKE_N = 10.0, GATE_N = 0.05;
 
@@ -84,10 +84,9 @@ Faults::Line Faults::line(double t_s) {
   }
   const Kind kind = fault_.kind;
   const bool one = random_.next() % 2 == 0, other = random_.next() % 2 == 0;
-  const bool half = kind == Kind::garbage || kind == Kind::noisy;
-  line.commands = kind != Kind::silent && kind != Kind::fault && (one || !half);
-  line.answers = kind != Kind::silent && kind != Kind::garbage && kind != Kind::unanswered && (other || kind != Kind::noisy);
-  line.late_s = kind == Kind::late ? LATE_s : kind == Kind::latency_timer ? LATENCY_TIMER_s : 0.0;
+  line.commands = kind != Kind::silent && kind != Kind::fault && (one || kind != Kind::noisy);
+  line.answers = kind != Kind::silent && kind != Kind::unanswered && (other || kind != Kind::noisy);
+  line.late_s = kind == Kind::late ? LATE_s : 0.0;
   return line;
 }
 

@@ -13,25 +13,23 @@ namespace fingertip::cell {
 struct Fault {
   enum class Kind {
     none,
-    gone,          // no frames arrive
-    frozen,        // the readings do not change, so every frame is the last one
-    uncertain,     // UNCERTAIN: location and load are random; the force is halved if only one fingertip has it
-    saturated,     // SATURATED and FORCE_LOWER_BOUND: the force is halved
-    silent,        // neither commands nor answers arrive
-    garbage,       // half of the commands arrive, no answer does
-    unanswered,    // all commands arrive, no answer does
-    noisy,         // half of the commands and half of the answers arrive
-    late,          // answers come 30 ms late, and the line waits for them
-    latency_timer, // answers come at the end of 16 ms, and the line waits for them
-    fault,         // 9: the gripper stops and takes no moves
-    power,         // power was lost and is back: the gripper is not active
-    taken,         // the object is taken away
-    nothing,       // no contact is reported
-    tared,         // the present force and load count as zero
-    reboot,        // no frames for 1.5 s, then as tared
-    moved_zero,    // the force is 1.5 N less
-    weak,          // force and load are 30 % less
-    spike,         // force and load are 10 N more
+    gone,       // no frames arrive
+    frozen,     // the readings do not change, so every frame is the last one
+    uncertain,  // UNCERTAIN: location and load are random; the force is halved if only one fingertip has it
+    saturated,  // SATURATED and FORCE_LOWER_BOUND: the force is halved
+    silent,     // neither commands nor answers arrive
+    unanswered, // commands arrive, no answer does
+    noisy,      // half of the commands and half of the answers arrive
+    late,       // answers come 30 ms late, and the line waits for them
+    fault,      // 9: the gripper stops and takes no moves
+    power,      // power was lost and is back: the gripper is not active
+    taken,      // the object is taken away
+    nothing,    // no contact is reported
+    tared,      // the present force and load count as zero
+    reboot,     // no frames for 1.5 s, then as tared
+    moved_zero, // the force is 1.5 N less
+    weak,       // force and load are 30 % less
+    spike,      // force and load are 10 N more
   };
   Kind kind = Kind::none;
   std::array<bool, 2> fingers{}; // of which fingertips

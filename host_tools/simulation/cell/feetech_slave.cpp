@@ -123,7 +123,7 @@ private:
     put(PRESENT_POSITION, static_cast<int>(std::lround(jaw_.count(motion_.reported_width_mm()))));
     memory_[STATUS] = trouble_;
     memory_[MOVING] = motion_.moving() ? 1 : 0;
-    put(PRESENT_CURRENT, static_cast<int>(std::lround(std::abs(motion_.effort()) * STALL_A / AMPERE_PER_COUNT)));
+    put(PRESENT_CURRENT, static_cast<int>(std::lround(motion_.effort() * STALL_A / AMPERE_PER_COUNT)));
   }
 
   // given: an address and how much from there on.

@@ -20,7 +20,6 @@ struct Known {
 };
 // Ranges keep the physics within its steps.
 constexpr Known KNOWN[] = {{Event::Kind::pour, 0.0, 5.0, 1.0},
-                           {Event::Kind::jerk, 0.0, 20.0, 0.3},
                            {Event::Kind::knock, 0.0, 0.5, 0.02},
                            {Event::Kind::slick, 0.0, 0.95, 0.5},
                            {Event::Kind::lower, 0.2, 10.0, 0.0}};
@@ -48,8 +47,8 @@ Event planned(const std::string &text) {
     }
   }
   throw Error(ErrorCode::bad_value, "\"" + text +
-                                        "\" is no disturbance; give pour:0..5 (masses), jerk:0..20 (m/s2), knock:0..0.5 "
-                                        "(m/s), slick:0..0.95 (share of friction) or lower:0.2..10 (s), and @SECONDS after the lift");
+                                        "\" is no disturbance; give pour:0..5 (masses), knock:0..0.5 (m/s), slick:0..0.95 "
+                                        "(share of friction) or lower:0.2..10 (s), and @SECONDS after the lift");
 }
 
 bool is_disturbance(const std::string &name) {
@@ -145,7 +144,7 @@ std::string World::cells() const {
     load_N += is_there_ ? 0.5 * std::hypot(load.x, load.y) : 0.0;
   }
   const double since_s = since_lift_s();
-  const double least_N = is_there_ && since_s >= grasp_.lift_s ? need_N(since_s) : 0.0;
+  const double least_N = is_there_ && since_s >= grasp_.lift_s ? grasp_.least_N(since_s) : 0.0;
   const double friction = 0.5 * (cell_.friction(0) + cell_.friction(1));
   std::string text = fixed(time_s_, 5);
   for (const double value : {motion_.width_mm(), is_there_ ? cell_.mean_N() : 0.0, peak_N_, load_N, least_N, cell_.slid_mm(),

@@ -22,8 +22,9 @@ GripperMechanics gripper_mechanics(const std::string &model) {
 }
 
 GripperMotion::GripperMotion(const GripperMechanics &mechanics, std::optional<double> active_mm)
-    : mechanics_(mechanics), phase_(active_mm ? Phase::active : Phase::off), drive_mm_(active_mm.value_or(mechanics.traits.stroke_mm)),
-      fingers_mm_(drive_mm_), target_mm_(drive_mm_), speed_mm_s_(mechanics.traits.speed_max_mm_s), force_N_(mechanics.traits.force_max_N) {}
+    : mechanics_(mechanics), phase_(active_mm ? Phase::active : Phase::off),
+      drive_mm_(nearest_step_mm(active_mm.value_or(mechanics.traits.stroke_mm))), fingers_mm_(drive_mm_), target_mm_(drive_mm_),
+      speed_mm_s_(mechanics.traits.speed_max_mm_s), force_N_(mechanics.traits.force_max_N) {}
 
 double GripperMotion::nearest_step_mm(double width_mm) const {
   const GripperTraits &traits = mechanics_.traits;
@@ -150,13 +151,10 @@ void GripperMotion::step(double seconds) {
 
 double GripperMotion::effort() const {
   if (blocked_ != 0) {
-    return blocked_ * force_N_ / std::max(mechanics_.traits.force_max_N, 1e-9);
+    return force_N_ / std::max(mechanics_.traits.force_max_N, 1e-9);
   }
   const double full = 0.3; // of the largest, while nothing is in the way
-  if (activating()) {
-    return phase_ == Phase::closing ? -full : full;
-  }
-  return moving_ ? (target_mm_ > drive_mm_ ? full : -full) * speed_mm_s_ / mechanics_.traits.speed_max_mm_s : 0.0;
+  return activating() ? full : moving_ ? full * speed_mm_s_ / mechanics_.traits.speed_max_mm_s : 0.0;
 }
 
 GripperStatus GripperMotion::status() const {
@@ -169,21 +167,7 @@ GripperStatus GripperMotion::status() const {
 }
 
 GripperLine::GripperLine(const GripperMechanics &mechanics, double width_mm, Random random)
-    : motion_(mechanics), next_s_(random.uniform(0.0, mechanics.traits.poll_s)) {
-  constexpr double STEP_s = 0.01, LONGEST_s = 30.0;
-  motion_.activate();
-  while (!motion_.active() && motion_.time_s() < LONGEST_s) {
-    motion_.step(STEP_s);
-  }
-  GripperMove move;
-  move.width_mm = width_mm;
-  move.speed_mm_s = mechanics.traits.speed_max_mm_s;
-  motion_.move(move);
-  motion_.step(mechanics.traits.latency_s + STEP_s);
-  while (motion_.moving() && motion_.time_s() < LONGEST_s) {
-    motion_.step(STEP_s);
-  }
-}
+    : motion_(mechanics, width_mm), next_s_(random.uniform(0.0, mechanics.traits.poll_s)) {}
 
 GripperLine::Answer GripperLine::exchange(const GripCommand &command) {
   const double t_s = next_s_, poll_s = motion_.mechanics().traits.poll_s;

@@ -35,7 +35,7 @@ GripperMechanics gripper_mechanics(const std::string &model);
 
 class GripperMotion {
 public:
-  // Active, the fingers at this width; none: not active yet, and open.
+  // Active, the fingers at the step nearest to this width; none: not active yet, and open.
   explicit GripperMotion(const GripperMechanics &mechanics, std::optional<double> active_mm = {});
 
   // Whether what is between the fingers pushes back with at least force_N at this width; below 0: what is around them, while they open.
@@ -60,7 +60,7 @@ public:
   double width_mm() const { return fingers_mm_; }
   // The width that the gripper reports: its drive's position, in its steps.
   double reported_width_mm() const { return nearest_step_mm(drive_mm_); }
-  // Between -1 (closing at full speed) and 1, for the currents that a gripper reports.
+  // 0 to 1, for the currents that a gripper reports.
   double effort() const;
   bool active() const { return phase_ == Phase::active; }
   bool activating() const { return phase_ != Phase::off && phase_ != Phase::active; }
@@ -104,7 +104,7 @@ private:
 // the gripper's state at that time arrives half of that time later.
 class GripperLine {
 public:
-  // At the start it is activated and has this width. random: when the first exchange is.
+  // random: when the first exchange is.
   GripperLine(const GripperMechanics &mechanics, double width_mm, Random random);
 
   GripperMotion &motion() { return motion_; }

@@ -182,7 +182,7 @@ Shape shape_of(const std::string &name) { return one_of(SHAPES, "shape", name); 
 Kind kind_of(const std::string &name) { return one_of(KINDS, "kind", name); }
 
 const char *name_of(Event::Kind kind) {
-  constexpr const char *NAMES[] = {"knock", "push", "vibrate", "pour", "carry", "slick", "jerk", "lower"};
+  constexpr const char *NAMES[] = {"knock", "push", "vibrate", "pour", "carry", "slick", "lower"};
   return NAMES[static_cast<int>(kind)];
 }
 
@@ -206,7 +206,6 @@ KindOfGrasp::Inputs KindOfGrasp::inputs(double t_s) const {
     case Event::Kind::pour: inputs.mass_kg += event.amount * mass_kg * way_of(share); break;
     case Event::Kind::carry: hand_m_s2 = event.amount / EASED_ACCELERATION * acceleration_of(share); break;
     case Event::Kind::slick: inputs.friction_share *= 1.0 - event.amount * way_of(share); break;
-    case Event::Kind::jerk: hand_m_s2 = lasts ? event.amount * std::sin(2.0 * M_PI * share) : 0.0; break;
     case Event::Kind::lower:
       inputs.lifted_mm -= (inputs.lifted_mm + event.beyond_mm) * way_of(share);
       inputs.hand_m_s2.y -= 1e-3 * (lift_mm + event.beyond_mm) * acceleration_of(share) / (event.seconds * event.seconds);

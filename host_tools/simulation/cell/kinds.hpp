@@ -49,7 +49,6 @@ struct Event {
     pour,    // mass that comes, of the object's own
     carry,   // the hand's largest acceleration, m/s2, on a way of minimum jerk
     slick,   // share of friction that goes
-    jerk,    // the hand's acceleration, m/s2, one period of a sine; no kind draws it
     lower,   // back onto the table, minimum jerk, in amount seconds; no kind draws it
   };
   Kind kind;

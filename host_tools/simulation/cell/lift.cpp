@@ -56,7 +56,7 @@ public:
   Lift(const LiftOptions &options, const Place &place)
       : options_(options), place_(place), face_(LIFT_FACE, LAYER_mm, options.cache),
         fingers_(place, place.fingers(FINGERS, options.seed, options.gain_spread.value_or(0.05), false, GAIN_ERROR)),
-        motion_(GripperServer::mechanics(options.model), options.world.grasp.width_mm + options.opens_mm),
+        motion_(GripperServer::mechanics(options.model), options.world.grasp.width_mm + options.world.grasp.opens_mm),
         server_(motion_, {.model = options.model, .link = place.port("gripper"), .real_time = false}) {
     fingers_.wait_until_ready();
     world_.emplace(options.world, face_, motion_);
@@ -212,7 +212,7 @@ private:
     return true;
   }
 
-  static constexpr const char *COMMANDS = "give lift, take, pour|jerk|knock|slick|lower AMOUNT once it is lifted, kill|freeze|thaw "
+  static constexpr const char *COMMANDS = "give lift, take, pour|knock|slick|lower AMOUNT once it is lifted, kill|freeze|thaw "
                                           "left|right, line none|silent|garbage|damaged|other_slave|refused, late MS, latency_timer "
                                           "MS, power on|off, fault CODE, at_touch COMMAND; COMMAND..., truth, or quit";
 
@@ -240,12 +240,11 @@ void be_of_kind(LiftOptions &options, Kind kind) {
   grasp.down_rad = options.world.grasp.down_rad;
   options.world.grasp = grasp;
   options.world.kind = kind;
-  options.opens_mm = options.world.grasp.opens_mm;
 }
 
 void check(const LiftOptions &options) {
   const GripperTraits &traits = gripper_traits(options.model);
-  const double widest_mm = options.world.grasp.width_mm + options.opens_mm;
+  const double widest_mm = options.world.grasp.width_mm + options.world.grasp.opens_mm;
   if (widest_mm > traits.stroke_mm) {
     throw Error(ErrorCode::bad_value,
                 options.model + " opens to " + fixed(traits.stroke_mm, 1) + " mm; the object and --opens take " + fixed(widest_mm, 1));

@@ -159,7 +159,7 @@ private:
                      : motion_.blocked() < 0   ? STOPPED_CLOSING
                                                : AT_REQUEST;
     const long count = CLOSED_COUNT - std::lround(motion_.reported_width_mm() / traits.stroke_mm * (CLOSED_COUNT - OPEN_COUNT));
-    const long current = std::lround(std::abs(motion_.effort()) * FULL_CURRENT_A / AMPERE_PER_COUNT);
+    const long current = std::lround(motion_.effort() * FULL_CURRENT_A / AMPERE_PER_COUNT);
     return {static_cast<std::uint16_t>((has(rACT) ? gACT : 0) | (goes ? gGTO : 0) | gsta << gSTA_SHIFT | gobj << gOBJ_SHIFT),
             static_cast<std::uint16_t>(fault() << 8 | (command_[1] & 0xFF)), static_cast<std::uint16_t>(count << 8 | current)};
   }

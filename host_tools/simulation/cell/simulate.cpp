@@ -135,7 +135,7 @@ int main(int argc, char **argv) {
   const CLI::Option *stiffness =
       for_lift(add("--stiffness", object.stiffness_N_mm, "N/MM", "Its stiffness; default: it does not yield"))->check(within(0.1, 1e6));
   for_lift(add("--crushes", object.crushes_N, "N", "More force breaks it; default: none does"))->check(within(0.1, 1e6));
-  lift_number("--opens", options.lift.opens_mm, "MM", 0.5, 100.0, "How much wider than the object the gripper is at first");
+  lift_number("--opens", object.opens_mm, "MM", 0.5, 100.0, "How much wider than the object the gripper is at first");
   lift_number("--lift-time", object.lift_s, "S", 0.05, 60.0, "How long the lift takes");
   for (std::size_t i = before_drawn; i < of_lift.size(); i++) {
     if (of_lift[i] != stiffness) { // no kind sets it
@@ -145,7 +145,7 @@ int main(int argc, char **argv) {
   for_lift(kind);
   for_lift(app.add_flag("--by-command", by_command, "Lift only on the command, not once the force is steady"));
   for_lift(add("--then", planned_texts, "KIND:AMOUNT@S",
-               "A disturbance: pour:MASSES, jerk:M/S2, knock:M/S, slick:SHARE, or lower:SECONDS onto the table, @SECONDS after the lift"));
+               "A disturbance: pour:MASSES, knock:M/S, slick:SHARE, or lower:SECONDS onto the table, @SECONDS after the lift"));
   lift_number("--patience", options.lift.patience_s, "S", 0.0, 3600.0,
               "Longest pause of the world while fingertips or the gripper's client are held up");
   for (CLI::Option *option : of_lift) {

@@ -21,7 +21,7 @@ TEST(Kinds, EventsAddUp) {
   using Kind = Event::Kind;
   grasp.events = {{Kind::pour, 1.0, 1.0, 0.8},
                   {Kind::slick, 3.0, 0.5, 0.25},
-                  {Kind::jerk, 4.0, 0.4, 6.0},
+                  {Kind::vibrate, 4.0, 0.4, 6.0, 0.0, 2.5},
                   {Kind::knock, 5.0, 0.02, 0.1},
                   {Kind::lower, 6.0, 0.5, 0.5}};
   EXPECT_NEAR(grasp.least_N(0.9), 0.5 * 9.81, 1e-9);
