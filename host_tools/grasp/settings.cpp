@@ -167,7 +167,7 @@ GripSettings settings_for(const GripperTraits &traits, const std::map<std::strin
   follow("start", settings.start_N, 0.0, cap_N, above_cap);
   follow("floor", settings.floor_N, 0.0, cap_N, above_cap);
   follow("blind", settings.blind_N, settings.start_N, cap_N, "it must lie between " + name_of("start") + " and " + name_of("cap"));
-  const double least_mm = traits.step_mm * std::max(1.0, std::ceil(traits.deadband_mm / std::max(traits.step_mm, 1e-6) - 1e-9));
+  const double least_mm = GripReach(traits).least_mm();
   const double step_N = GripBound::first_N(least_mm);
   if (step_N > cap_N) {
     impossible("the least move of a " + traits.model + ", " + fixed(least_mm, 2) + " mm, may press with " + fixed(step_N, 1) +

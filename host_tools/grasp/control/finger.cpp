@@ -11,10 +11,7 @@ extern "C" {
 
 namespace fingertip {
 
-// A fingertip whose values stay the same to the last bit for this time and this number of frames is
-// stuck: noise changes them with every frame.
-constexpr double FROZEN_s = 0.05;
-constexpr int FROZEN_FRAMES = 5;
+constexpr int FROZEN_FRAMES = 5;     // with the same values to the last bit: it is stuck, since noise changes them with every frame
 constexpr double OLD_s = 0.5;        // an older frame is no evidence of the present
 constexpr double DELAY_SHARE = 0.05; // weight of a frame in the moving average of the delay
 constexpr int ZERO_FRAMES = 3;
@@ -87,7 +84,6 @@ void GripFinger::take(const GripTouch &touch) {
   }
   const bool has_contact = (touch.flags & CONTACT_FLAG_CONTACT) != 0 && (touch.flags & CONTACT_FLAG_HELD) == 0;
   if (!is_heard_ || !has_contact || !is_same(came_, touch)) {
-    changed_s_ = touch.t_s;
     unchanged_ = 0;
   } else {
     unchanged_++;
@@ -163,7 +159,7 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
     is_new_ = false;
   }
   const bool stale = !is_heard_ || now_s > heard_s_ + settings.stale_s || now_s > touch_.t_s + OLD_s;
-  const bool frozen = !stale && unchanged_ >= FROZEN_FRAMES && touch_.t_s - changed_s_ >= FROZEN_s;
+  const bool frozen = !stale && unchanged_ >= FROZEN_FRAMES;
   const bool no_force = !stale && now_s > force_s_ + settings.stale_s;
   reading.trouble = (stale ? GRIP_FINGER_0_STALE : 0u) | (frozen ? GRIP_FINGER_0_FROZEN : 0u) | (no_force ? GRIP_FINGER_0_NO_FORCE : 0u) |
                     (!stale && delay_s_ > settings.late_s ? GRIP_FINGER_0_LATE : 0u);

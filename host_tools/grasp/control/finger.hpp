@@ -48,8 +48,7 @@ struct GripReading {
 
 class GripReach;
 
-// A force that the gripper's motion does not explain is doubted. It is believed once it has lasted as
-// long as a silence may, and the other fingertip does not contradict it.
+// One fingertip. A force that the gripper's motion does not explain is doubted (CONTROL.md, "Safety").
 class GripFinger {
 public:
   void take(const GripTouch &touch);
@@ -106,7 +105,7 @@ private:
 
   GripTouch came_, touch_; // as it came, and what the pad bears of it
   bool is_heard_ = false, is_new_ = false, has_delay_ = false;
-  double heard_s_ = 0.0, changed_s_ = 0.0, force_s_ = 0.0; // arrival of a frame, a change, a force
+  double heard_s_ = 0.0, force_s_ = 0.0; // arrival of a frame, of a force
   double delay_s_ = 0.0;
   double force_t_s_ = 0.0, force_N_ = 0.0, sd_N_ = 0.0;
   GripReading believed_;

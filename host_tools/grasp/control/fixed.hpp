@@ -1,6 +1,4 @@
-// A set force by eq. (5) and (6) of De Clercq et al., RA-L 2022:
-//   (5)  e = F_des - (F_l + F_r) / 2
-//   (6)  dP = k e + k_i integral(e) + k_d e'
+// A set force by eq. (5) and (6) of De Clercq et al., RA-L 2022 (CONTROL.md).
 #pragma once
 
 #include "grasp/control/reach.hpp"

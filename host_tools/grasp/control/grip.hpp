@@ -1,11 +1,5 @@
-// The controller of a grasp: frames of two fingertips and a gripper's status in, one command out, called as fingertip_grip.h shows.
-//
-// Two modes. `fixed` holds a set force: De Clercq et al., RA-L 2022, eq. (5) and (6). `hold` holds an object of unknown weight by its load:
-// grip force = margin x tangential force / friction. The grip rises at once where the object slides, and falls slowly while it rests.
-// CONTROL.md has the reasons.
-//
-// No clock, no allocation, deterministic. Times are the caller's, in s, on one clock for all inputs. Forces are N, lengths mm, of one
-// fingertip: its normal force is the grip force.
+// The controller of a grasp: frames of two fingertips and a gripper's status in, one command out. It is called as fingertip_grip.h shows,
+// in the same units and on the same clock; no allocation. CONTROL.md has the reasons.
 #pragma once
 
 #include "grasp/control/finger.hpp"
@@ -39,9 +33,7 @@ public:
   void take(std::size_t finger, const GripTouch &touch);
   void take(const GripperStatus &status);
 
-  // GRASP: from IDLE, OPEN, DROPPED, MISSED, STILL. HOLD: the width stays, from every state but FAULT. RELEASE: opens, from every state but
-  // a FAULT of the gripper itself. False: not from this state. PLACE and HAND_OVER: from HOLDING in mode hold, PLACE with a load of 0.15 N
-  // and more: until it opens, a load against the present one, or a pull, does not raise the grip. HOLD ends them.
+  // False: not from this state (CONTROL.md, "Requests").
   bool request(GripRequest request);
 
   // Other settings from the next step on, in any state. False: their mode is another; nothing changes.

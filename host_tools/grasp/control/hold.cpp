@@ -6,14 +6,11 @@
 namespace fingertip {
 
 constexpr double FRICTION_LEAST = 0.08;
-// Above its latest peak the load and its rate are used as measured. Below the peak the object swings
-// on the rubber, or has begun to slide, and the mean is used.
+// Time constants of the rate, of the mean, and of a peak that is forgotten.
 constexpr double RATE_s = 0.02, MEAN_s = 0.06, FORGETS_s = 0.3;
 // A rate may add this force to the load, or this share of it.
 constexpr double AHEAD_N = 2.0, AHEAD = 0.65;
-constexpr double REMEMBERS_s = 1.0; // a recent load may return
-// If frames come later than SOON_s, the controller answers a push or a slide late. So it grips more
-// strongly in advance: by these amounts for each second of delay between SOON_s and SOON_s + LATEST_s.
+// Added to margin and floor for each second of delay between SOON_s and SOON_s + LATEST_s.
 constexpr double SOON_s = 0.01, LATEST_s = 0.04, MARGIN_1_s = 12.0, FLOOR_N_s = 28.0;
 constexpr double SWINGS_s = 0.25; // an object that was caught swings for this time
 constexpr double HELD_s = 0.015;  // averaging time of a ratio that held
@@ -22,15 +19,13 @@ constexpr double STEADY = 0.15, STEADY_s = 0.1, STEADY_N = 0.15;
 constexpr double LOADED_s = 0.3; // a load is known once it was steady for this time
 // A reported slide below this speed is a contact that settles, unless it lasts longer than CREEPS_s.
 constexpr double CREEPS_mm_s = 4.0, CREEPS_s = 0.15;
-// A contact that held within LATELY_s does not slide below this share of the ratio that it held, unless it became
-// slick. Then it slides by FAR_mm and more; squeezed rubber, and an object that was just caught, move less.
+// A contact that held within LATELY_s slides below this share of the ratio that it held by FAR_mm and more, or not at all.
 constexpr double LATELY_s = 0.2, BEGINS_AT = 0.7, FAR_mm = 1.0;
 // The place of a contact moves by less than this times the share of the force that the gripper has let go of lately.
 constexpr double SHIFTS_mm = 1.0;
 // Friction that falls as a slide begins is followed with this time constant.
 constexpr double FALLS_s = 0.06;
-// The load of an object that slides and does not slow down is its friction plus the force that stops
-// it within STOPS_s. The estimate follows with the time constant FOLLOWS_s.
+// What slides and does not slow down is to be stopped within STOPS_s; the load follows with the time constant FOLLOWS_s.
 constexpr double STOPS_s = 0.04, FOLLOWS_s = 0.035, GRAVITY_mm_s2 = 9810.0;
 // Friction falls by less than this factor as a slide begins.
 constexpr double GROWN = 1.4;
@@ -82,7 +77,7 @@ double GripHold::friction(const GripSettings &settings) const {
 }
 
 double GripHold::need_N(const GripSettings &settings, double delay_s, double dead_s) const {
-  const double load_N = sliding_ ? load_.now_N() : std::max({load_.ahead_N(dead_s), was_N_, settings.expected_N(was_loaded_)});
+  const double load_N = sliding_ ? load_.now_N() : std::max(load_.ahead_N(dead_s), settings.expected_N(was_loaded_));
   const double margin = settings.margin + MARGIN_1_s * late_s(delay_s);
   return (slides_ > 0 ? settings.slid : 1.0) * margin * load_N / friction(settings);
 }
@@ -121,7 +116,6 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
   }
   has_seen_load_ = true;
   load_.rests(readings.load_N, readings.load_sd_N, passed_s, slides_ > 0 && now_s - slid_s_ < SWINGS_s);
-  was_N_ = std::max(was_N_ - std::min(passed_s / REMEMBERS_s, 1.0) * was_N_, load_.now_N());
   ratio_ += std::min(passed_s / HELD_s, 1.0) * (readings.ratio - ratio_);
   if (readings.grip_N > 2.0 * settings.touch_N) {
     lately_ = std::max(lately_, readings.ratio);

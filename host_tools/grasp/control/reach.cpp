@@ -29,9 +29,7 @@ constexpr double SHORT_mm = 0.5;       // length of a short move
 constexpr double OPENS_mm = 0.3;       // largest single opening
 // A set force may be off by so many steps: more than half a step, or the gripper would oscillate.
 constexpr double OFF = 0.65;
-// Distance from the cap in standard deviations of a fingertip's force; the deviation is limited to
-// these shares of the force, because UNCERTAIN contacts report far more than the true error. Chosen
-// with simulated cylinders, whose forces are reported with the largest errors.
+// Distance from the cap in standard deviations of a fingertip's force, which are limited to these shares of it.
 constexpr double SDS = 2.5, SD_LEAST = 0.04, SD_MOST = 0.06;
 
 // Upper limit of the larger of both true forces.

@@ -38,8 +38,7 @@ private:
   double pair_N_ = 0.0, pair_mm_ = 0.0;
 };
 
-// An upper bound of the force after a move, on the stiffest contact that the earlier moves allow. It
-// does not need the width of the touch: the stiffer of two power laws counts, a flat and a steep one.
+// An upper bound of the force after a move, on the stiffest contact that the earlier moves allow (CONTROL.md, "The cap").
 class GripBound {
 public:
   // Force of one pad at 1 mm of indentation, assumed before a move of both pads has shown it. Round
@@ -53,8 +52,7 @@ public:
   // The least width at which a fingertip stays below the cap, whether or not the other touches. A pad
   // takes half of the travel, or less if the object gives way.
   double width_below(double cap_N, double force_N, double from_mm) const;
-  // Learns from force and width at rest, while both fingertips touch. A move that begins before the
-  // touch would show a contact softer than it is.
+  // Of force and width at rest, while both fingertips touch.
   void learn(double force_N, double width_mm);
   void forget_pair() { pair_N_ = 0.0; }
 

@@ -13,8 +13,6 @@
 // slides beyond SLIDES_mm_s.
 //
 // The hand's frame: x level, along the pads, y upwards; fingertip 0's normal is x cross y, fingertip 1 faces it.
-//
-// Left out: faces that tilt or bend, rolling on the table, the inertia of what is poured, a cup's cone.
 #pragma once
 
 #include "simulation/cell/face.hpp"

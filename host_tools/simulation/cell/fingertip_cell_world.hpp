@@ -1,8 +1,6 @@
 // The cell's world as time passes, its truth, and what can be done to it by name.
 //
-// The object is on the table between the fingers. Once the grip's force has been steady for a while, or by a command, the hand lifts it;
-// then come the events of the grasp (kinds.hpp), and those that are planned or commanded. What slides by less than SLIP_mm at a time has
-// not slipped. An object that slid DROP_mm, or that nothing presses any more, is gone.
+// README.md has its course. An object that slid DROP_mm, or that nothing presses any more, is gone.
 #pragma once
 
 #include "simulation/cell/cell.hpp"
@@ -45,8 +43,6 @@ public:
   // Without a force where nothing is touched.
   Patch patch(std::size_t finger) const { return is_there_ ? cell_.patch(finger) : Patch{}; }
 
-  // Grip of one fingertip that just holds the object then, by static friction; once it is lifted.
-  double need_N(double since_lift_s) const { return grasp_.least_N(since_lift_s); }
   double time_s() const { return time_s_; }
   bool touched() const { return peak_N_ > TOUCHED_N; }
   bool is_dropped() const { return is_dropped_; }

@@ -1,9 +1,6 @@
 // One grasp (kinds.hpp), closed loop, in simulated time: the cell (cell.hpp), what two fingertips
 // report of it, a controller, and a gripper's mechanics.
 //
-// A fingertip is the firmware's own code (native_stages.h) on the pressures of what touches the pad (face.hpp), with the errors of real
-// pads: gains, memory, after-effects and noise.
-//
 // The controller steps after every frame and every status of the gripper (gripper_motion.hpp), and
 // every 10 ms. Deterministic: the same grasp, seed and controller give the same bits.
 #pragma once

@@ -1,15 +1,9 @@
 // The simulations of `fingertip simulate`. Each goes on until a signal comes, or its time is over. All throw Error.
 //
-// --press: a weight on a ball is set down evenly all over each fingertip, to look at, to record and to calibrate from. With --mouse a hand
-// presses instead (hand_server.hpp): the ball goes where the hand is, within some 30 ms, without friction. The pad: 12 mm of silicone
-// without ends, which remembers as the twin's does (memory, aftereffect; twin/effects.hpp). Gains differ by 10 %, and are not calibrated.
-//
-// --validate: a hand that goes through the steps of `fingertip validate` (validated.hpp) whenever a program sets the fingertip's frame
-// rate, as validate does first.
-//
-// --lift: an object between two fingertips on a gripper, which `fingertip grasp` grasps and a hand then lifts. Physics and gripper run in
-// this process, a fingertip's firmware in each of two others. Time that this process is held up is none for the world, nor is time in which
-// the others are waited for: fingertips and lines go on, with what is as it was. Lines of standard input are obeyed.
+// README.md has what they do. Rubber of --press: 12 mm of silicone without ends, which remembers as the twin's does (memory, aftereffect;
+// twin/effects.hpp). Of --lift, physics and gripper run in this process, a fingertip's firmware in each of two others. Time that this
+// process is held up is none for the world, nor is time in which the others are waited for: fingertips and lines go on, with what is as it
+// was.
 #pragma once
 
 #include "simulation/cell/fingertip_cell_world.hpp"
@@ -32,7 +26,7 @@ void validate(const ValidatedOptions &options, std::optional<double> seconds, co
 struct LiftOptions : SimulationOptions {
   std::string model = gripper_models().front().model;
   World::Options world;
-  double opens_mm = 4.0, patience_s = 0.0;
+  double patience_s = 0.0;
 };
 // The first grasp of this kind at the options' seed (kinds.hpp), and how far the gripper is open then; gravity and the
 // object's stiffness are the options'. Errors and delays of frames are no part of it: the fingertips are the firmware.
