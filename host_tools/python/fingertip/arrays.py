@@ -104,7 +104,7 @@ class Library:
 def table_of(rows):
     """Readings, a row for each. Raises InputError."""
     try:
-        return np.array(rows, float)
+        return np.ma.filled(np.ma.array(rows, float), np.nan)
     except (TypeError, ValueError):
         raise InputError("readings are no numbers, or not as many in each row") from None
 

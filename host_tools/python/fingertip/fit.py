@@ -106,14 +106,16 @@ def _described(what: Described, folder: pathlib.Path | None = None) -> Mapping[s
 def read_pad(pad: Described) -> Pad:
     """A name that the tool knows, a file, or its content (boards/pads/README.md). Raises InputError."""
     text = _described(pad, None if isinstance(pad, Mapping) else _installed("pads", "../share/fingertip/pads"))
-    name, rubber = str(text.get("name", "the pad")), text.get("rubber", {})
+    name, rubber = str(text.get("name", "the pad")), text.get("rubber") or {}
     try:
         pitch_mm = float(text["pitch_mm"])
         if "places_mm" in text:
-            places = np.array(text["places_mm"], float).reshape(-1, 2)
+            places = np.array(text["places_mm"], float)
+            if places.shape != (len(places), 2):
+                raise ValueError("places_mm are no [x, y] of each sensor")
         else:
-            columns, rows = int(text["columns"]), int(text["rows"])
-            if not (1 <= columns <= SENSORS_MAX and 1 <= rows <= SENSORS_MAX):
+            columns, rows = text["columns"], text["rows"]
+            if not (columns in range(1, SENSORS_MAX + 1) and rows in range(1, SENSORS_MAX + 1)):
                 raise ValueError(f"{columns} x {rows} sensors: give 1 to {SENSORS_MAX} of each")
             nodes = np.column_stack(np.divmod(np.arange(columns * rows), rows))
             places = pitch_mm * (nodes - (np.array([columns, rows]) - 1) / 2)
@@ -195,12 +197,13 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
         wrong = f"pressures are of {middle_Pa / 1000:.0f} kPa, as the air's; give the number of rows at rest at the beginning (zero)"
     elif most > MOST_Pa:
         wrong = f"the largest pressure is {most:.3g} Pa, more than such sensors measure; give their unit"
+    elif least < -max(most / 2, open_Pa):
+        where = " (row {}, sensor {})".format(*np.argwhere(table == least)[0] + (1, 0))
+        wrong = f"pressures fall to {least:.0f} Pa{where}: the zero is that of a press (give rows at rest), or the sign is another"
     elif most < 6 * noise_Pa:
         wrong = f"the largest pressure is {most:.3g} Pa, below six times the noise of {noise_Pa:g} Pa: nothing touches, or the unit is another (kPa?)"
     elif touch_Pa > open_Pa:
         wrong = f"a reading moves by {touch_Pa:.0f} Pa in the {zero_rows} rows at rest: something touches; give fewer rows (zero)"
-    elif least < -max(most / 2, open_Pa):
-        wrong = f"pressures fall to {least:.0f} Pa, the largest is {most:.0f} Pa: the zero is that of a press; give rows at rest (zero)"
     if wrong:
         raise InputError(wrong)
     if scatter_Pa > 2 * noise_Pa:
