@@ -26,7 +26,7 @@ constexpr std::uint32_t FORCE_ONLY =
     CONTACT_FLAG_UNCERTAIN | CONTACT_FLAG_FLAT | CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_SATURATED | CONTACT_FLAG_ZERO_DOUBTFUL;
 // A place with one of these flags is not trusted. UNCERTAIN is: the place may have moved under the tangential force that it shows.
 constexpr std::uint32_t NO_PLACE = FORCE_ONLY & ~std::uint32_t{CONTACT_FLAG_UNCERTAIN};
-// A tangential force as large as the normal one moves the middle of what the pad bears of the Gaussian by about so much, x and y, on
+// A tangential force as large as the normal one moves the middle of what the pad bears of the Gaussian by about this way, x and y, on
 // 12 mm of rubber, whatever the shape, but along a contact as long as the pad by less (unit.cell.face).
 constexpr double PULLED_x_mm = 3.5, PULLED_y_mm = 4.2, LONG_mm = 14.0;
 constexpr double PULLS_s = 0.025, LEAPS = 0.5, GROWS = 1.25; // one frame alone shows no pull

@@ -27,7 +27,7 @@ constexpr double NEAR = 0.03;          // error that is near enough, as a share 
 constexpr double WEAK = 0.8;           // a grip below this share of it is too weak
 constexpr double SHORT_mm = 0.5;       // length of a short move
 constexpr double OPENS_mm = 0.3;       // largest single opening
-// A set force may be off by so many steps: more than half a step, or the gripper would oscillate.
+// A set force may be off by this number of steps: more than half a step, or the gripper would oscillate.
 constexpr double OFF = 0.65;
 // Distance from the cap in standard deviations of a fingertip's force, which are limited to these shares of it.
 constexpr double SDS = 2.5, SD_LEAST = 0.04, SD_MOST = 0.06;

@@ -4,7 +4,7 @@
 //   SET POS 100 SPE 255 FOR 0 GTO 1    ack
 //   GET POS                            POS 97
 //
-// A line of text a question, one at a time. The names are those of the registers (robotiq.hpp); there is no current. `ack` only says that
+// A line of text a question, one at a time. The names are those of the registers (robotiq.hpp); there is no current. `ack` only states that
 // the controller has the values, so a move is under way until PRE, the gripper's own goal, is the one that was sent. An answer has no
 // number, so after one that did not come in time it connects again. How long an answer takes is assumed.
 //

@@ -39,7 +39,7 @@ SETS = {"12 s": ((*STILL, "12"), "ours"), "60 s": ((*STILL, "60"), "ours"), "12 
 # What one fingertip reports wrongly in a steady hold: for one frame, for ten; the others for good.
 WRONG_SHORT, WRONG = ("frame", "frames", "spike"), ("nothing", "tared", "reboot", "moved_zero", "weak")
 SQUEEZED, SQUEEZED_N = 1.3, 1.0  # the grip rises by both
-REQUESTS, AGAINST = ("place", "hand_over"), 1.5  # the grip rises by so much against a pull
+REQUESTS, AGAINST = ("place", "hand_over"), 1.5  # the grip rises by this factor against a pull
 CYCLES = 4  # turns of the commanded width in the last half of a hold
 GRASPS, GRASPS_MORE = 1000, 200
 USUAL, USUAL_MORE = 100, 30

@@ -36,7 +36,7 @@ public:
 
 private:
   static constexpr double FIRST_N = 2.0, TOUCH_N = 0.15, MOST_N = 20.0, MARGIN = 1.3, SLID = 1.3;
-  static constexpr double APPROACH_mm_s = 8.0, STIFFNESS_N_mm = 3.0, MOVES_s = 0.1, STANDS_s = 0.2;
+  static constexpr double APPROACH_mm_s = 8.0, STIFFNESS_N_mm = 3.0, MOVES_s = 0.1, SETTLED_s = 0.2;
 
   void approach(double now_s, double low_N) {
     if (low_N >= TOUCH_N) {
@@ -50,7 +50,7 @@ private:
   void hold(double now_s, double low_N) {
     if (report_.state == GRIP_SQUEEZE) {
       held_s_ = low_N < 0.6 * FIRST_N ? now_s : held_s_;
-      report_.state = now_s - held_s_ > STANDS_s ? GRIP_HOLDING : GRIP_SQUEEZE;
+      report_.state = now_s - held_s_ > SETTLED_s ? GRIP_HOLDING : GRIP_SQUEEZE;
     } else {
       const auto load_of = [](const GripTouch &touch) { return std::hypot(touch.qx_N, touch.qy_N); };
       const double load_N = 0.5 * (load_of(touch_[0]) + load_of(touch_[1])), force_N = 0.5 * (touch_[0].force_N + touch_[1].force_N);
