@@ -30,7 +30,7 @@ void PlacementFinder::restart() {
   begun_ = false;
   slots_.clear();
   open_ = Slot{};
-  rest_Pa_.clear();
+  rest_Pa_.assign(sensors_, 0.0);
   above_Pa_.assign(sensors_, 0.0);
 }
 
@@ -97,9 +97,6 @@ void PlacementFinder::find_rest(double t_s) {
   const double end_s = t_s - BEFORE_TOUCH_s;
   sensor_map seen = 0;
   const std::vector<double> mean = mean_of(std::max(end_s - REST_s, rest_from_s_), end_s, &seen);
-  if (rest_Pa_.empty()) {
-    rest_Pa_.assign(sensors_, 0.0);
-  }
   for (std::size_t k = 0; k < sensors_; k++) {
     if (seen >> k & 1u) {
       rest_Pa_[k] = mean[k];

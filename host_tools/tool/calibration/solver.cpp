@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
@@ -160,16 +159,19 @@ double Solution::worst_shape_sd() const {
 }
 
 void set_earlier(std::vector<Placement> &placements) {
-  std::vector<double> left_Pa;
+  const double fading = std::exp(-RESTED_BEFORE_s / LET_GO_s);
+  std::vector<double> most_Pa;
   double at_s = 0.0;
   for (Placement &placement : placements) {
-    left_Pa.resize(placement.reading_Pa.size(), 0.0);
-    const double fading = std::exp((at_s - placement.t_s) / PAST_s);
-    for (double &each : left_Pa) {
-      each *= fading;
+    const double until_rest = std::exp((at_s + RESTED_BEFORE_s - placement.t_s) / LET_GO_s);
+    most_Pa.resize(placement.reading_Pa.size(), 0.0);
+    placement.earlier_Pa = most_Pa;
+    for (std::size_t k = 0; k < most_Pa.size(); k++) {
+      const double reading_Pa = std::max(placement.reading_Pa[k], 0.0);
+      placement.earlier_Pa[k] *= until_rest;
+      most_Pa[k] = std::max(fading * placement.earlier_Pa[k], reading_Pa);
+      placement.earlier_Pa[k] -= most_Pa[k] - reading_Pa;
     }
-    placement.earlier_Pa = left_Pa;
-    std::transform(left_Pa.begin(), left_Pa.end(), placement.reading_Pa.begin(), left_Pa.begin(), std::plus<>());
     at_s = placement.t_s;
   }
 }

@@ -23,8 +23,8 @@
  * were off (o), contacts that are not round (q, of all and of each), a pad or a hand aslant (t: tangential force of all placements over
  * their normal force, P as PULL has it). The posterior of each is in the Solution; judge.hpp has the limits. Zeros that move are not in the
  * readings, which are above those just before. What a sensor alone keeps of a press is: of this one it is a constant share, and so part of
- * its gain; of those before (r) it fades between the rest and the readings. It is not much, but without it the dip passes for what it would
- * be elsewhere.
+ * its gain. Of those before (r) it fades between the rest and the readings, and a press takes it back (firmware/condition/ZERO.md). It is
+ * not much, but without it the dip passes for what it would be elsewhere.
  *
  * How large the spreads of b, e, w, q and of the places are, and the model's own error, is learnt from the session
  * itself (expectation and maximisation, from the Assumptions as the start): sensors that are where they should be
@@ -56,13 +56,13 @@ struct Placement {
   std::vector<double> reading_Pa; /* [sensor] above zero, mean over the frames */
   sensor_map usable = 0;          /* bitmap of the sensors whose reading is a measurement */
   std::vector<double> rest_Pa;    /* [sensor] just before it, of any origin; empty: not known */
-  std::vector<double> earlier_Pa; /* [sensor] M: what is left of those before (set_earlier); empty: none */
+  std::vector<double> earlier_Pa; /* [sensor] M: by how much less is let go of than at rest (set_earlier); empty: none */
   double noise_Pa = 0.0;          /* sd of a mean */
   double fading = 0.0;            /* share of them that the readings together lose in the half second */
 };
 
-/* Rubber's after-effects fade with 1 to 4 s. */
-constexpr double PAST_s = 3.0;
+/* As in firmware/condition: what was let go of, more than is pressed now, fades with it. */
+constexpr double LET_GO_s = 2.0;
 /* Sets earlier_Pa of all placements of a session, in the order of time. judge() does. */
 void set_earlier(std::vector<Placement> &placements);
 

@@ -236,19 +236,19 @@ TEST(Solver, sees_what_a_session_holds) {
   EXPECT_NEAR(shape.ellipse_of_all[1], 0.0, 0.02);
 }
 
-/* What a sensor keeps of the placements before fades between the rest and the readings. */
+/* What a sensor keeps of the placements before fades between the rest and the readings, and a press takes it back. */
 TEST(Solver, finds_what_remains_of_the_placements_before) {
   const KnownPad pad(8);
   auto placements = good_session(pad, 30, 8);
   for (std::size_t i = 0; i < 30; i++) {
-    placements[i].t_s = PAST_s * double(i);
+    placements[i].t_s = (LET_GO_s + RESTED_BEFORE_s) * double(i);
   }
   set_earlier(placements);
   auto remembering = placements;
   for (std::size_t k = 0; k < 15; k++) {
     EXPECT_EQ(placements[0].earlier_Pa[k], 0.0);
-    const double left_Pa = placements[1].reading_Pa[k] + placements[0].reading_Pa[k] / M_E;
-    EXPECT_NEAR(placements[2].earlier_Pa[k], left_Pa / M_E, 1e-9);
+    const double was = std::max(placements[0].reading_Pa[k], 0.0), now = std::max(placements[1].reading_Pa[k], 0.0);
+    EXPECT_NEAR(placements[1].earlier_Pa[k], was / M_E - std::max(was * std::exp(-1 - RESTED_BEFORE_s / LET_GO_s) - now, 0.0), 1e-9);
     for (std::size_t i = 0; i < 30; i++) {
       remembering[i].reading_Pa[k] -= 0.01 * (static_cast<double>(k % 5) - 2.0) * placements[i].earlier_Pa[k];
     }
