@@ -293,6 +293,7 @@ _OTHERS = {
     b"\xfd7zXZ": "packed as a whole by xz: unxz FILE",
     b"\x89MCAP0": "an MCAP file that was copied as text; copy it again, as bytes",
     b"PK\3\4": "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV",
+    **dict.fromkeys((b"\x93NUMPY", b"MATLAB 5", b"\x89HDF"), "arrays of NumPy or MATLAB, no text; save them as CSV"),
     b"SQLite format 3": "a bag of ROS 2 in SQLite; ros2 bag convert makes one in MCAP, packed as it is now",
     **dict.fromkeys((b"\xff\xfe", b"\xfe\xff", b"#\0", b"\0#"), "text in UTF-16, an editor's or a spreadsheet's; save it as UTF-8"),
 }
@@ -337,9 +338,7 @@ class _RecordingLines:
                     self.mcap = McapLineReader(self.path, self.progress, self.interval_s)
                     yield from self.mcap.items()
                     return
-                for magic, what in _OTHERS.items():
-                    if start.startswith(magic):
-                        raise InputError(f"{self.path}: {what}")
+                check_kind_of_file(self.path, start)
                 file.seek(3 if start.startswith(b"\xef\xbb\xbf") else 0)
                 source: Any = file
                 if (b"\r" in start and b"\n" not in start) or OF_SPREADSHEETS.search(start):
@@ -370,6 +369,12 @@ class _RecordingLines:
                     number += len(is_row)
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
+
+
+def check_kind_of_file(path: Path, start: bytes) -> None:
+    for magic, what in _OTHERS.items():
+        if start.startswith(magic):
+            raise InputError(f"{path}: {what}")
 
 
 def is_recording(path: Path) -> bool:

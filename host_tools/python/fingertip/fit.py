@@ -6,6 +6,8 @@ plt.plot(found["x_mm"], found["y_mm"], ".")
 
 import argparse
 import contextlib
+import csv
+import datetime
 import functools
 import itertools
 import json
@@ -26,7 +28,7 @@ from .arrays import Firmware, MeasureError, q10, round_half_away, table_of, usab
 from .command import Parser, check_output, printable, progress, reporter
 from .errors import InputError
 from .evaluate import add_recording_options, check_time, load_recording
-from .files import is_recording, write_text
+from .files import check_kind_of_file, is_recording, write_text
 from .line import SENSORS_MAX, Flag
 
 FloatArray = npt.NDArray[np.float64]
@@ -41,12 +43,16 @@ ABSOLUTE_Pa = 3e4  # the air is more, and touches are not in the median of all r
 AIR_Pa = (8e4, 1.1e5)  # absolute pressures at rest, up to 1900 m above the sea
 LIGHT_Pa = 500.0  # a touch of some grams
 ALIKE, GAP = 0.1, 5.0  # shares: sensors at rest by the air; of the usual step in time
+STEP_s = 1.5  # rows are seldom further apart
 LEAST = dict.fromkeys(
     ("sigma_mm", "sigma_sd_mm", "dip_share", "dip_sd_mm", "force_scale", "force_scale_sd", "gain_sd"), 0.0
 )  # of a calibration
 LEAST |= {"gain": 1e-3, "off_x_mm": -1e3, "off_y_mm": -1e3, "wider": -1e3}
 OF_SENSORS = ("gain", "gain_sd", "off_x_mm", "off_y_mm", "wider")
-NO_PRESSURE = re.compile(r"(t|x|y|z|f|q[xyz]?|time|temp|temperature|force|row|frame|index)([_ (\[].*)?", re.IGNORECASE)
+NO_PRESSURE = re.compile(r"(t|x|y|z|f|q[xyz]?|time|temp[0-9]*|temperature[0-9]*|force|row|frame|index)([_ (\[].*)?", re.IGNORECASE)
+UNIT_NAMED = re.compile(rf"(?<![A-Za-z])({'|'.join(UNITS)})(?![A-Za-z])")
+TIME_NAMED = re.compile(r"(?<![a-z])(?:(ms|millis?)|us|\u00b5s|micros?)(?:ec|econds?)?(?![a-z])", re.IGNORECASE)
+MISSING = ("", "na", "n/a", "#n/a", "null", "none", "-", "--")  # as programs write a cell that has no number
 PLACEMENT_Pa, PLACEMENTS, EVERY_s = 1500.0, 40, 8.0  # of a calibration: readings lighter than this are no placement
 
 
@@ -111,8 +117,8 @@ def read_pad(pad: Described) -> Pad:
         pitch_mm = float(text["pitch_mm"])
         if "places_mm" in text:
             places = np.array(text["places_mm"], float)
-            if places.shape != (len(places), 2):
-                raise ValueError("places_mm are no [x, y] of each sensor")
+            if places.shape != (len(places), 2) or len(np.unique(places, axis=0)) < len(places):
+                raise ValueError("places_mm are no [x, y] of each sensor, or two sensors are at the same place")
         else:
             columns, rows = text["columns"], text["rows"]
             if not (columns in range(1, SENSORS_MAX + 1) and rows in range(1, SENSORS_MAX + 1)):
@@ -124,8 +130,10 @@ def read_pad(pad: Described) -> Pad:
         if not (0.01 <= pitch_mm <= 1000 and (np.hypot(*places.T) <= 128 * pitch_mm).all()):
             raise ValueError(f"pitch_mm {pitch_mm:g} is out of range; give 0.01 to 1000 mm, and places within 128 pitches")
         thickness_mm, overhang_mm = (float(rubber.get(key, 0)) for key in ("thickness_mm", "overhang_mm"))
+        if not (0 <= thickness_mm <= 1000 and 0 <= overhang_mm <= 1000):
+            raise ValueError(f"rubber of {thickness_mm:g} mm, {overhang_mm:g} mm beyond the sensors: give 0, for not known, to 1000 mm")
         return Pad(name, places[:, 0].copy(), places[:, 1].copy(), pitch_mm, thickness_mm, overhang_mm)
-    except (KeyError, OverflowError, TypeError, ValueError) as error:
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as error:
         raise InputError(f"{name}: {type(error).__name__} {error}; boards/pads/README.md has what a pad is described by") from None
 
 
@@ -149,6 +157,12 @@ def _warn(text: str) -> None:
     warnings.warn(text, stacklevel=4)
 
 
+def _seconds(time: npt.ArrayLike) -> FloatArray:
+    """Of numbers or dates."""
+    values = np.asarray(time)
+    return np.asarray((values - values[:1]) / np.timedelta64(1, "s") if values.dtype.kind == "M" else values, float)
+
+
 def _noise_Pa(table: FloatArray) -> float:
     """Rms of rows that follow each other, from their differences."""
     return float(np.nanmedian(np.abs(np.diff(table, axis=0)))) / (0.6745 * 2**0.5) if len(table) >= 8 else 0.0
@@ -161,7 +175,7 @@ def _gates_Pa(noise_Pa: float) -> tuple[float, float]:
     return open_Pa, close_Pa
 
 
-def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noise_Pa: float, time_s: npt.ArrayLike | None) -> FloatArray:
+def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noise_Pa: float, time_s: FloatArray | None) -> FloatArray:
     """Pa above the zero [row, sensor]. Raises InputError where they cannot be those of touches on the pad, warns of what makes that unlikely."""
     if unit not in UNITS:
         raise InputError(f"{printable(unit)} is no unit; give one of {', '.join(UNITS)}")
@@ -170,8 +184,12 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
         raise InputError(
             f"pressures are {' x '.join(map(str, table.shape))}, and pad {pad.name} has {len(pad.x_mm)} sensors: rows x {len(pad.x_mm)}"
         )
-    if time_s is not None and (np.shape(time_s) != (len(table),) or not (np.diff(np.asarray(time_s, float)) > 0).all()):
-        raise InputError("time does not rise from row to row; without a time each row is a contact of its own")
+    if time_s is not None and time_s.shape != (len(table),):
+        raise InputError(f"time has {time_s.size} values, and there are {len(table)} rows; give one for each")
+    if time_s is not None and len(fallen := 1 + np.flatnonzero(~(np.diff(time_s) > 0))):
+        raise InputError(f"time does not rise after row {fallen[0]}; without a time each row is a contact of its own")
+    if time_s is not None and len(time_s) > 1 and (step_s := float(np.median(np.diff(time_s)))) > STEP_s:
+        _warn(f"rows are {step_s:.4g} s apart: is the time in seconds?")
     if not 0 <= zero_rows <= len(table) or not 0 < noise_Pa < MOST_Pa:
         raise InputError(f"{zero_rows} rows at rest of {len(table)}, noise of {noise_Pa:g} Pa: give rows that are there, and noise above 0")
     if np.isinf(table).any() or not np.isfinite(table[: zero_rows or None]).any():
@@ -190,22 +208,25 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
         touch_Pa = np.nanmax(np.abs(rest - zero_Pa))
         table = table - zero_Pa
     most, least = np.nanmax(table), np.nanmin(table)
+    where_most, where_least = (f" (row {row + 1}, sensor {k})" for row, k in (np.argwhere(table == value)[0] for value in (most, least)))
+    others = np.flatnonzero(seen)[(level_Pa < 0.5 * middle_Pa) & (middle_Pa > ABSOLUTE_Pa)]
     wrong = ""
     if airs and unit not in airs:
         wrong = f"readings at rest are {middle_Pa / UNITS[unit]:.4g} {unit}, as the air's in {' or '.join(airs)}; give that unit"
     elif not zero_rows and abs(middle_Pa) > ABSOLUTE_Pa and most < MOST_Pa:
         wrong = f"pressures are of {middle_Pa / 1000:.0f} kPa, as the air's; give the number of rows at rest at the beginning (zero)"
     elif most > MOST_Pa:
-        wrong = f"the largest pressure is {most:.3g} Pa, more than such sensors measure; give their unit"
+        wrong = f"the largest pressure is {most:.3g} Pa{where_most}, more than such sensors measure; give their unit"
     elif least < -max(most / 2, open_Pa):
-        where = " (row {}, sensor {})".format(*np.argwhere(table == least)[0] + (1, 0))
-        wrong = f"pressures fall to {least:.0f} Pa{where}: the zero is that of a press (give rows at rest), or the sign is another"
+        wrong = f"pressures fall to {least:.0f} Pa{where_least}: the zero is that of a press (give rows at rest), the sign is another, or it is none"
     elif most < 6 * noise_Pa:
         wrong = f"the largest pressure is {most:.3g} Pa, below six times the noise of {noise_Pa:g} Pa: nothing touches, or the unit is another (kPa?)"
     elif touch_Pa > open_Pa:
         wrong = f"a reading moves by {touch_Pa:.0f} Pa in the {zero_rows} rows at rest: something touches; give fewer rows (zero)"
     if wrong:
         raise InputError(wrong)
+    if len(others):
+        _warn(f"sensor {others[0]} is at {level_Pa.min():.4g} Pa, and others at {middle_Pa:.0f} Pa: is that column a pressure?")
     if scatter_Pa > 2 * noise_Pa:
         _warn(f"readings scatter by {scatter_Pa:.0f} Pa from row to row; give that as the noise, which is {noise_Pa:g} Pa")
     if most < LIGHT_Pa:
@@ -273,6 +294,7 @@ def fit(
     with the 24 before it in its contact. Raises InputError, with the cause. A row takes a millisecond, or without a thickness 20 us."""
     of_pad = read_pad(pad)
     known = _calibrated(calibration, of_pad)
+    time_s = None if time_s is None else _seconds(time_s)
     reading_Pa = _readings(pressures, of_pad, unit, zero_rows, noise_Pa, time_s)
     chip = firmware()
     profile = None
@@ -285,7 +307,7 @@ def fit(
     rows = np.arange(len(readings))
     alone = np.ones(len(rows), bool)
     if time_s is not None:
-        steps_s = np.diff(np.asarray(time_s, float))
+        steps_s = np.diff(time_s)
         alone[1:] = steps_s > GAP * np.median(steps_s) if len(steps_s) else False
     begins = _begins(readings.max(axis=1) / 1024.0, noise_Pa, alone)
     if time_s is not None and alone[1:].any():
@@ -408,6 +430,7 @@ def calibrate(
     if force_N is not None and not 0.1 <= force_N <= 50:
         raise InputError(f"a weight of {force_N:g} N is out of range; give 0.1 to 50 N, which are 10 to 5100 grams")
     of_pad = read_pad(pad)
+    time_s = None if time_s is None else _seconds(time_s)
     reading_Pa = _readings(pressures, of_pad, unit, zero_rows, noise_Pa, time_s)
     from .validation.placements import Placement, placements_of, solve_gains  # which need this module
 
@@ -416,47 +439,82 @@ def calibrate(
         chosen = reading_Pa[pressed[np.linspace(0, len(pressed) - 1, min(PLACEMENTS, len(pressed))).astype(int)]]
         placements = [Placement(EVERY_s * i, np.nan_to_num(row), np.isfinite(row), 0 * row, noise_Pa, 0.0) for i, row in enumerate(chosen)]
     else:
-        placements = placements_of(np.asarray(time_s, float), reading_Pa)
+        placements = placements_of(time_s, reading_Pa)
     *_, found, sensors = solve_gains(of_pad, placements, force_N or 1.0)
     if found["state"] != 1:
         raise InputError(f"not calibrated from {len(placements)} placements: {found['text'].decode()}")
     return response_of(found, sensors) | ({} if force_N else {"force_scale": 0.0, "force_scale_sd": 0.0})
 
 
+def _number(cell: str) -> float:
+    """Seconds of a date or a time of day, NaN of a cell that has none. Raises ValueError."""
+    try:
+        return float(cell)
+    except ValueError:
+        text = cell.strip()
+    if text.lower() in MISSING:
+        return math.nan
+    try:
+        moment = datetime.datetime.fromisoformat(text if "-" in text else f"1970-01-01 {text}")
+    except ValueError:
+        raise ValueError(f'"{text}" is no number; leave the cell empty where there is none, or delete the line') from None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.timezone.utc)).timestamp()
+
+
+def _cells(line: str) -> list[str]:
+    """A comma is a point where it does not separate, and nothing is quoted, as thousands are."""
+    separator = next((each for each in ";\t," if each in line), None)
+    if separator and '"' in line:
+        return next(csv.reader([line], delimiter=separator))
+    return [cell.strip(" ,").replace(",", ".") for cell in line.split(separator)]
+
+
 def read_numbers(path: str) -> tuple[list[str], FloatArray]:
-    """(cells of the last line before the first row of numbers, rows) of a text file with comma, semicolon, tab or blanks between cells.
+    """(names of the columns from the lines before the first row of numbers, rows) of a text file with comma, semicolon, tab or blanks between cells.
     Raises InputError, which names the line."""
     rows: list[list[float]] = []
-    head: list[str] = []
-    count = 0
+    heads: list[list[str]] = []
+    count, wrong = 0, f"{path}: no row of numbers in it"
     try:
-        text = sys.stdin.read() if path == "-" else pathlib.Path(path).read_text(encoding="utf-8-sig", errors="replace")
+        data = sys.stdin.buffer.read() if path == "-" else pathlib.Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
-    for number, line in enumerate(map(str.strip, text.splitlines()), 1):
-        if not line or line.startswith("#"):
-            continue
-        cells = line.split(next((each for each in ",;\t" if each in line), None))
-        try:
-            values = [float(cell) if cell.strip() else float("nan") for cell in cells]
-        except ValueError as error:
-            if rows:
-                raise InputError(f"{path}:{number}: {error}; where a sensor has none, leave the cell empty") from None
-            head = cells
-            continue
-        if rows and len(values) != count:
-            raise InputError(f"{path}:{number}: {len(values)} cells, and {count} before")
-        count = len(values)
-        rows.append(values)
+    check_kind_of_file(path, data)
+    lines = data.decode("utf-8-sig", "replace").splitlines()
+    with progress("reading") as show:
+        for number, line in enumerate(lines, 1):
+            if not line.strip() or line.lstrip().startswith("#"):
+                continue
+            if number % 1000 == 0:
+                show(number / len(lines))
+            cells = _cells(line)
+            if len(rows) == 1 and count <= 2 < len(cells):
+                rows = []  # a date above the table
+            try:
+                values = [_number(cell) for cell in cells]
+            except ValueError as error:
+                wrong = f"{path}:{number}: {error}"
+                if rows:
+                    raise InputError(wrong) from None
+                heads.append(cells)
+                continue
+            if rows and len(values) != count:
+                raise InputError(f"{path}:{number}: {len(values)} cells, and {count} before; delete the line if it was cut")
+            count = len(values)
+            rows.append(values)
     if not rows:
-        raise InputError(f"{path}: no row of numbers in it")
-    return head, np.array(rows)
+        raise InputError(wrong)
+    table = np.array(rows)
+    table = table[: np.flatnonzero(np.isfinite(table).any(axis=1)).max(initial=0) + 1]  # rows of separators may be behind it
+    return [" ".join(names).strip(" \"'") for names in zip(*(cells for cells in heads if len(cells) == count))], table
 
 
-def read_table(path: str, sensors: int, first: int | None = None, time: int | None = None) -> tuple[FloatArray, FloatArray | None]:
-    """(pressures [row, sensor], time [row] or None) of such a file. first, time: columns counted from 1. Raises InputError, and warns of
+def read_table(path: str, sensors: int, first: int | None, time: int | None, unit: str) -> tuple[FloatArray, FloatArray | None]:
+    """(pressures [row, sensor], time [row] in seconds or None) of such a file. first, time: columns counted from 1. Raises InputError, and warns of
     columns that look like others."""
     head, table = read_numbers(path)
+    if head and not head[-1] and np.isnan(table[:, -1]).all():  # each line ends with a separator
+        head, table = head[:-1], table[:, :-1]
     count = table.shape[1]
     begin = count - sensors if first is None else first - 1
     if begin < 0 or begin + sensors > count or (first is None and begin > 1) or not 0 <= (time or 1) - 1 < count:
@@ -465,19 +523,24 @@ def read_table(path: str, sensors: int, first: int | None = None, time: int | No
             "sensor 0, and --time N"
         )
     column = time if time is not None else 1 if first is None and begin == 1 else None
-    if time is None and column and not (np.diff(table[:, 0]) > 0).all():
-        raise InputError(f"{path}: column 1 of {count} would be the time, and does not rise; give --first N, the column of sensor 0")
+    if time is None and column and len(fallen := 1 + np.flatnonzero(~(np.diff(table[:, 0]) > 0))):
+        raise InputError(f"{path}: column 1 of {count} would be the time, and does not rise after row {fallen[0]}; give --first N")
     for at in range(begin, begin + sensors):
-        name = head[at].strip(" \"'") if len(head) == count else ""
+        name = head[at] if head else ""
         if NO_PRESSURE.fullmatch(name) or _rises(table[:, at]):
             wrong = f'is "{printable(name)}", no pressure' if name else "rises evenly, as a time or a row's number"
             raise InputError(f"{path}: column {at + 1}, of sensor {at - begin}, {wrong}; --first N is the column of sensor 0")
         if len(table) > 1 and np.ptp(table[:, at]) == 0.0:
             _warn(f"column {at + 1}, of sensor {at - begin}, never changes; leave its cells empty if the sensor is dead")
+    units = {found[1] for name in head[begin : begin + sensors] if (found := UNIT_NAMED.search(name))}
+    if units - {unit}:
+        _warn(f"columns are named as in {' or '.join(sorted(units))}, and read as {printable(unit)}; give --unit {min(units)} if they are")
     times = [at + 1 for at in range(count) if column is None and _rises(table[:, at])]
     if times:
         _warn(f"column {times[0]} rises evenly: a time? Give --time {times[0]}; without it each row is a held contact")
-    return table[:, begin : begin + sensors], None if column is None else table[:, column - 1]
+    of_unit = TIME_NAMED.search(head[column - 1]) if head and column else None
+    second = (1e3 if of_unit[1] else 1e6) if of_unit else 1.0
+    return table[:, begin : begin + sensors], None if column is None else table[:, column - 1] / second
 
 
 def _recorded(options: argparse.Namespace) -> tuple[FloatArray, FloatArray, Mapping[str, Any]]:
@@ -539,7 +602,8 @@ def main(argv: list[str]) -> int:
         check_output(options.output, options.recording, options.calibration, described, replace=options.overwrite)
     recorded = _recorded(options) if is_recorded else None
     pad = options.pad or (recorded and recorded[2]) or parser.error("--pad NAME, or FILE.json, is needed: what the columns are of")
-    pressures, time_s = recorded[:2] if recorded else read_table(options.recording, len(read_pad(pad).x_mm), options.first, options.time)
+    of_file = (options.recording, len(read_pad(pad).x_mm), options.first, options.time, options.unit)
+    pressures, time_s = recorded[:2] if recorded else read_table(*of_file)
     common = {"unit": options.unit, "zero_rows": options.zero, "noise_Pa": options.noise, "time_s": time_s}
     if options.calibrate:
         force_N = None if options.weight is None else 9.80665e-3 * options.weight
