@@ -79,7 +79,7 @@ class Fit(unittest.TestCase):
 
     def test_a_missing_sensor_is_left_out_and_flagged(self):
         x_mm, y_mm, readings_Pa = presses(PAD, 50, 4.5)
-        found = fingertip.fit(np.ma.array(readings_Pa, mask=[PAD.x_mm * 0 + np.arange(8) == 3] * 50), "2x4")
+        found = fingertip.fit(np.ma.array(readings_Pa, mask=[np.arange(8) == 3] * 50), "2x4")
         self.assertTrue((found["flags"] & Flag.SENSOR_MASKED > 0).all() and (found["sensors_used"] & 8 == 0).all())
         self.assertLess(off_mm(found, x_mm, y_mm), 0.3)
         described = {"pitch_mm": 9, "columns": 4, "rows": 4, "rubber": RUBBER}
@@ -193,7 +193,6 @@ class Fit(unittest.TestCase):
             (readings_Pa, {"pitch_mm": 9, "columns": 2, "rows": 4, "rubber": {"thickness_mm": -12}}, {}, "rubber of -12 mm"),
             (np.where(series_Pa == series_Pa[12, 5], -9999, series_Pa), "2x4", {}, "fall to -9999 Pa .row 13, sensor 5.: the zero"),
             (readings_Pa, {"pitch_mm": np.nan, "columns": 2, "rows": 4}, {}, "pitch_mm nan is out of range"),
-            (readings_Pa, {"pitch_mm": 9, "columns": -2, "rows": -4}, {}, "-2 x -4 sensors: give 1 to 36"),
             (readings_Pa, {"pitch_mm": 9, "columns": 9, "rows": 5}, {}, "45 sensors: 1 to 36"),
             (readings_Pa / 1000, "2x4", {}, "below six times the noise"),
             (readings_Pa, "2x4", {"unit": "bar"}, "more than such sensors measure"),
