@@ -59,8 +59,7 @@ class Folder(unittest.TestCase):
 
 class Boot2Checksum(Folder):
     def test_the_image_check_has_the_catalogued_crc(self):
-        # CRC-32/MPEG-2, check value over "123456789".
-        self.assertEqual(check_image.crc32_mpeg2(b"123456789"), 0x0376E6E7)
+        self.assertEqual(check_image.crc32_mpeg2(b"123456789"), 0x0376E6E7)  # CRC-32/MPEG-2
 
     def test_code_that_does_not_fit_is_refused(self):
         for length in (0, 253):
