@@ -14,7 +14,7 @@ endif()
 #   raw     pressures and tare only
 #   press   location and force, in the least flash
 #   slip    location, force, slip, raw packets, sync pin: the least latency
-#   grasp   as slip, with tangential force, a search for outliers, and honest doubt where none is estimated
+#   grasp   as slip, with tangential force, a search for outliers, and the location's error where none is estimated
 #   shapes  as grasp, with contact shapes: two contacts, edges
 #   paper   as slip, in the published setting: 20 Hz, slip by eq. (7) with n = 2
 # host_tools/README.md has the table of what each computes, leaves out and costs.
@@ -32,7 +32,7 @@ endif()
 #   FULL_GRID         the kernel for full rectangles: faster, and with separate widths and ELONGATED (fit.h); without
 #                     it, that for missing sensors fits all frames
 #   OUTLIERS          a search for a sensor whose reading does not belong to the others'; FIT_GENERAL has it always
-#   TANGENTIAL_BIAS  what a tangential force that is not estimated does to the standard deviation of the location
+#   TANGENTIAL_BIAS   what a tangential force that is not estimated does to the standard deviation of the location
 #                     (fit_bias.h), and learning from touches how far gains are apart (fit_gains.h)
 #   SLIP              slip, and the command that sets it
 #   TANGENTIAL        tangential force, and the commands that bring and erase the pad's profile

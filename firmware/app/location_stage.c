@@ -8,7 +8,7 @@
 #include <math.h>
 #include <string.h>
 
-/* Interval from which on each frame has time for its stage search for an outlier, us: the search takes up to 1 ms. */
+/* Interval from which on each frame has time for its own search for an outlier, us: the search takes up to 1 ms. */
 #define OUTLIER_EACH_FRAME_us 2000u
 /* Change of the force scale with the air pressure, per kPa: on one of two cast pads the response to one weight doubled
  * over 172 kPa, on the other it did not change (the arrays of host_tools/report/real). */

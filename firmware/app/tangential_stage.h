@@ -2,7 +2,7 @@
  * .fit and .contact_input, and the settings of location_stage. Writes findings.tangential, .tangential_force and .slept_us, and adds flags.
  *
  * The second processor estimates it (jobs.h). Frames that come faster than TANGENTIAL_NO_WAIT_us do not wait: each takes
- * the estimate of the frame before, moved and scaled as the Gaussian has changed since. Slower ones wait for their stage. */
+ * the estimate of the frame before, moved and scaled as the Gaussian has changed since. Slower ones wait for their own. */
 #pragma once
 
 #include "app/findings.h"
@@ -15,7 +15,7 @@ struct tangential_stage {
   const struct pad_profile *profile; /* in use; NULL: none */
   bool is_asked;                     /* and not answered yet */
   bool same_contact;                 /* as in the question before, and the same pad */
-  bool waits;                        /* this frame waits for its stage answer; else it has that of the frame before */
+  bool waits;                        /* this frame waits for its own answer; else it has that of the frame before */
   bool is_late;                      /* in this frame */
   uint64_t asked_us;
   uint32_t limit_us; /* longest wait after that */

@@ -54,7 +54,7 @@
 /* After a longer interval between two locations the history is dropped. */
 #define MOTION_PAUSE_us 125000u
 
-/* Sums over all frames up to one. */
+/* Sums over all frames before one. */
 struct motion_sums {
   uint32_t t_us;             /* of that frame */
   uint32_t count;            /* of frames */

@@ -40,7 +40,7 @@ struct fit_bias_search {
   int32_t matrix[FIT_BIAS_UNKNOWNS][FIT_BIAS_UNKNOWNS];     /* lower half of the normal matrix */
 };
 
-/* State of one contact, from frame to frame. fit_bias_begin sets it to zeros. */
+/* State of one contact, from frame to frame. All zeros: as fit_bias_begin leaves it. */
 struct fit_bias {
   bool known;
   uint8_t part; /* of the search: which is next */

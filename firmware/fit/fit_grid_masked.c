@@ -231,7 +231,7 @@ static NOINLINE void set_mass(const struct readings *readings, struct columns *c
 struct dips {
   struct polynomial p1, p2, p3;
 };
-/* Pitches squared, SQUARE_Q: a contact and sensors in use that are further elongation_shift show no more. */
+/* Pitches squared, SQUARE_Q: a contact and sensors in use that are further apart show no more. */
 #define PART_MAX (32 << SQUARE_Q)
 static NOINLINE void set_dips(const struct columns *c, struct dips *dips) {
   const int32_t off_x = c->centre_x - c->mean_x, off_y = c->centre_y - c->mean_y;

@@ -45,7 +45,7 @@ static void set_down(int32_t *down, int nodes, int origin, int32_t centre, int32
   }
 }
 
-/* How far one unit of each column moves a coefficient of the step: the inverse_stiffness over its norm. */
+/* How far one unit of each column moves a coefficient of the step: the inverse stiffness over its norm. */
 struct units {
   struct scaled of1, of2, of3;
 };

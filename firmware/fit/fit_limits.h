@@ -97,7 +97,7 @@ static inline bool fit_has_dip(const struct fit_settings *settings) {
          bytes_from_f32(settings->dip_share) - 1u < bytes_from_f32(FIT_DIP_SHARE_MAX);
 }
 
-/* With fewer iterations the contact is not known before the last of them. */
+/* With no more than FIT_DEVIATION_ITERATIONS nothing is corrected: the contact is not known before the last of them. */
 static inline bool fit_has_deviations(const struct fit_settings *settings) {
   return settings->deviations && settings->iterations > FIT_DEVIATION_ITERATIONS;
 }

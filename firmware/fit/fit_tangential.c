@@ -303,7 +303,7 @@ void fit_tangential_estimate(const struct fit_array *array, struct fit_pad *pad,
   problem.pad = pad;
   set_known(array, settings, &problem);
   struct fit_settings of_readings = *settings;
-  of_readings.dip_share = 0.0f; /* readings without work for a dip */
+  of_readings.dip_share = 0.0f; /* readings without room for a dip */
   if (!(fit->flags & CONTACT_FLAG_FIT_VALID) || settings->noise_Pa_q10 < 1 ||
       !fit_grid_take_readings(array, pressure_Pa_q10, fit->used, &of_readings, &problem.readings) ||
       !weigh(array, settings, fit->used, &problem, &pad->work)) {

@@ -110,9 +110,6 @@ class Checks(unittest.TestCase):
         self.poke(".rodata", at, bytes([0x80] * 32))
         self.assertLess(worst(), nested - 2 * 36)
 
-    def test_frames_without_compiler_files(self):
-        self.assert_fails("-fstack-usage", "stack_usage.py", "--su-dir", self.folder)
-
     def test_frame_of_variable_size(self):
         (self.folder / "a.su").write_text("a.c:1:2:f\t8\tdynamic\n")
         self.assert_fails("variable size", "stack_usage.py", "--su-dir", self.folder)

@@ -82,8 +82,8 @@ void GripFinger::take(const GripTouch &touch) {
   if (is_heard_ && touch.t_s <= touch_.t_s) {
     return;
   }
-  const bool has_contact = (touch.flags & CONTACT_FLAG_CONTACT) != 0 && (touch.flags & CONTACT_FLAG_HELD) == 0;
-  if (!is_heard_ || !has_contact || !is_same(came_, touch)) {
+  const bool has_fit = (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (touch.flags & CONTACT_FLAG_HELD) == 0; // else values are 0
+  if (!is_heard_ || !has_fit || !is_same(came_, touch)) {
     unchanged_ = 0;
   } else {
     unchanged_++;
@@ -100,7 +100,7 @@ void GripFinger::take(const GripTouch &touch) {
   if (has_load()) {
     load_zero_.take(touch.qx_N, touch.qy_N);
   }
-  if (has_contact && (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (touch.flags & (NO_PLACE | CONTACT_FLAG_TANGENTIAL_VALID)) == 0) {
+  if (has_fit && (touch.flags & (NO_PLACE | CONTACT_FLAG_TANGENTIAL_VALID)) == 0) {
     follow_place();
   }
 }

@@ -12,16 +12,17 @@ constexpr double RATE_s = 0.02, MEAN_s = 0.06, FORGETS_s = 0.3;
 constexpr double AHEAD_N = 2.0, AHEAD = 0.65;
 // Added to margin and floor for each second of delay between SOON_s and SOON_s + LATEST_s.
 constexpr double SOON_s = 0.01, LATEST_s = 0.04, MARGIN_1_s = 12.0, FLOOR_N_s = 28.0;
-constexpr double SWINGS_s = 0.25; // an object that was caught swings for this time
-constexpr double HELD_s = 0.015;  // averaging time of a ratio that held
+constexpr double REMEMBERS_s = 1.0; // a recent load may return
+constexpr double SWINGS_s = 0.25;   // an object that was caught swings for this time
+constexpr double HELD_s = 0.015;    // averaging time of a ratio that held
 // A load is steady if it changes within STEADY_s by less than this share or this force.
 constexpr double STEADY = 0.15, STEADY_s = 0.1, STEADY_N = 0.15;
 constexpr double LOADED_s = 0.3; // a load is known once it was steady for this time
 // A reported slide below this speed is a contact that settles, unless it lasts longer than CREEPS_s.
 constexpr double CREEPS_mm_s = 4.0, CREEPS_s = 0.15;
-// A contact that held within LATELY_s slides below this share of the ratio that it held by FAR_mm and more, or not at all.
+// Below this share of the ratio that held within LATELY_s, a motion is a slide only from FAR_mm on.
 constexpr double LATELY_s = 0.2, BEGINS_AT = 0.7, FAR_mm = 1.0;
-// The place of a contact moves by less than this times the share of the force that the gripper has let go of lately.
+// The place of a contact moves by less than this times the share by which the measured grip has fallen lately.
 constexpr double SHIFTS_mm = 1.0;
 // Friction that falls as a slide begins is followed with this time constant.
 constexpr double FALLS_s = 0.06;
@@ -77,7 +78,7 @@ double GripHold::friction(const GripSettings &settings) const {
 }
 
 double GripHold::need_N(const GripSettings &settings, double delay_s, double dead_s) const {
-  const double load_N = sliding_ ? load_.now_N() : std::max(load_.ahead_N(dead_s), settings.expected_N(was_loaded_));
+  const double load_N = sliding_ ? load_.now_N() : std::max({load_.ahead_N(dead_s), was_N_, settings.expected_N(was_loaded_)});
   const double margin = settings.margin + MARGIN_1_s * late_s(delay_s);
   return (slides_ > 0 ? settings.slid : 1.0) * margin * load_N / friction(settings);
 }
@@ -116,6 +117,7 @@ void GripHold::update(const GripReadings &readings, const GripSettings &settings
   }
   has_seen_load_ = true;
   load_.rests(readings.load_N, readings.load_sd_N, passed_s, slides_ > 0 && now_s - slid_s_ < SWINGS_s);
+  was_N_ = std::max(was_N_ - std::min(passed_s / REMEMBERS_s, 1.0) * was_N_, load_.now_N());
   ratio_ += std::min(passed_s / HELD_s, 1.0) * (readings.ratio - ratio_);
   if (readings.grip_N > 2.0 * settings.touch_N) {
     lately_ = std::max(lately_, readings.ratio);

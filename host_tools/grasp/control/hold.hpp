@@ -69,6 +69,7 @@ private:
   double fastest_mm_s_ = 0.0;
   double still_s_ = 0.0;  // time of the last frame without a slide
   double steady_s_ = 0.0; // the load has been steady since
+  double was_N_ = 0.0;    // largest recent load; it decays over REMEMBERS_s
   double ratio_ = 0.0;    // smoothed tangential over normal force at rest
   double lately_ = 0.0;   // largest ratio within LATELY_s
   double moved_mm_ = 0.0; // length of the present reported slide

@@ -30,7 +30,8 @@ def command() -> Callable[[], int]:
 
 def installed() -> int:
     """What the program's name names."""
-    return _tool(pathlib.PurePath(sys.argv[0]).stem.removeprefix("fingertip-").replace("-", "_"))()
+    name = pathlib.PurePath(sys.argv[0]).stem.removeprefix("fingertip-").replace("-", "_")
+    return _tool(name)() if name in COMMANDS else command()()
 
 
 if __name__ == "__main__":

@@ -51,7 +51,10 @@ LEAST |= {"gain": 1e-3, "off_x_mm": -1e3, "off_y_mm": -1e3, "wider": -1e3}
 OF_SENSORS = ("gain", "gain_sd", "off_x_mm", "off_y_mm", "wider")
 NO_PRESSURE = re.compile(r"(t|x|y|z|f|q[xyz]?|time|temp[0-9]*|temperature[0-9]*|force|row|frame|index)([_ (\[].*)?", re.IGNORECASE)
 UNIT_NAMED = re.compile(rf"(?<![A-Za-z])({'|'.join(UNITS)})(?![A-Za-z])")
-TIME_NAMED = re.compile(r"(?<![a-z])(?:(ms|millis?)|us|\u00b5s|micros?)(?:ec|econds?)?(?![a-z])", re.IGNORECASE)
+SECONDS = {"milli": 1e-3, "m": 1e-3, "micro": 1e-6, "u": 1e-6, "\u00b5": 1e-6, "\u03bc": 1e-6, "\ufffd": 1e-6, "nano": 1e-9, "n": 1e-9}
+TIME_NAMED = re.compile(rf"(?<![a-z])({'|'.join(SECONDS)})s(?:ecs?|econds?)?(?![a-z])")
+CLOCK = re.compile(r"\d:\d|\d{4}-\d\d-\d\d")
+DECIMAL = re.compile(r"[-+]?\d*([.,])\d+(?:[eE][-+]?\d+)?")
 MISSING = ("", "na", "n/a", "#n/a", "null", "none", "-", "--")  # as programs write a cell that has no number
 PLACEMENT_Pa, PLACEMENTS, EVERY_s = 1500.0, 40, 8.0  # of a calibration: readings lighter than this are no placement
 
@@ -158,9 +161,14 @@ def _warn(text: str) -> None:
 
 
 def _seconds(time: npt.ArrayLike) -> FloatArray:
-    """Of numbers or dates."""
-    values = np.asarray(time)
-    return np.asarray((values - values[:1]) / np.timedelta64(1, "s") if values.dtype.kind == "M" else values, float)
+    """Of numbers, dates or durations. Raises InputError."""
+    values = np.atleast_1d(np.asarray(time))
+    try:
+        values = values.astype("M8[us]") if values.dtype.kind in "OU" else values
+        values = values - values[:1] if values.dtype.kind == "M" else values
+        return np.asarray(values / np.timedelta64(1, "s") if values.dtype.kind == "m" else values, float)
+    except (TypeError, ValueError):
+        raise InputError("time is neither numbers, in seconds, nor dates; give one for each row") from None
 
 
 def _noise_Pa(table: FloatArray) -> float:
@@ -185,7 +193,7 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
             f"pressures are {' x '.join(map(str, table.shape))}, and pad {pad.name} has {len(pad.x_mm)} sensors: rows x {len(pad.x_mm)}"
         )
     if time_s is not None and time_s.shape != (len(table),):
-        raise InputError(f"time has {time_s.size} values, and there are {len(table)} rows; give one for each")
+        raise InputError(f"time has {' x '.join(map(str, time_s.shape))} values, and there are {len(table)} rows; give one for each")
     if time_s is not None and len(fallen := 1 + np.flatnonzero(~(np.diff(time_s) > 0))):
         raise InputError(f"time does not rise after row {fallen[0]}; without a time each row is a contact of its own")
     if time_s is not None and len(time_s) > 1 and (step_s := float(np.median(np.diff(time_s)))) > STEP_s:
@@ -209,7 +217,7 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
         table = table - zero_Pa
     most, least = np.nanmax(table), np.nanmin(table)
     where_most, where_least = (f" (row {row + 1}, sensor {k})" for row, k in (np.argwhere(table == value)[0] for value in (most, least)))
-    others = np.flatnonzero(seen)[(level_Pa < 0.5 * middle_Pa) & (middle_Pa > ABSOLUTE_Pa)]
+    others = np.flatnonzero((level_Pa < 0.5 * middle_Pa) & (middle_Pa > ABSOLUTE_Pa))
     wrong = ""
     if airs and unit not in airs:
         wrong = f"readings at rest are {middle_Pa / UNITS[unit]:.4g} {unit}, as the air's in {' or '.join(airs)}; give that unit"
@@ -226,7 +234,9 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
     if wrong:
         raise InputError(wrong)
     if len(others):
-        _warn(f"sensor {others[0]} is at {level_Pa.min():.4g} Pa, and others at {middle_Pa:.0f} Pa: is that column a pressure?")
+        _warn(
+            f"sensor {np.flatnonzero(seen)[others[0]]} is at {level_Pa[others[0]]:.4g} Pa, and others at {middle_Pa:.0f} Pa: is that column a pressure?"
+        )
     if scatter_Pa > 2 * noise_Pa:
         _warn(f"readings scatter by {scatter_Pa:.0f} Pa from row to row; give that as the noise, which is {noise_Pa:g} Pa")
     if most < LIGHT_Pa:
@@ -446,74 +456,104 @@ def calibrate(
     return response_of(found, sensors) | ({} if force_N else {"force_scale": 0.0, "force_scale_sd": 0.0})
 
 
-def _number(cell: str) -> float:
-    """Seconds of a date or a time of day, NaN of a cell that has none. Raises ValueError."""
-    try:
+def _number(cell: str) -> float | None:
+    """Seconds of a date or a time of day, NaN of a cell that has none; None: no number."""
+    with contextlib.suppress(ValueError):
         return float(cell)
-    except ValueError:
-        text = cell.strip()
-    if text.lower() in MISSING:
+    if cell.lower() in MISSING:
         return math.nan
-    try:
+    if not CLOCK.search(cell):
+        return None
+    text = re.sub(r"[.,](\d+)", lambda found: f".{found[1][:6]:0<6}", cell).replace("Z", "+00:00")
+    with contextlib.suppress(ValueError):
         moment = datetime.datetime.fromisoformat(text if "-" in text else f"1970-01-01 {text}")
-    except ValueError:
-        raise ValueError(f'"{text}" is no number; leave the cell empty where there is none, or delete the line') from None
-    return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.timezone.utc)).timestamp()
+        return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.timezone.utc)).timestamp()
+    return None
 
 
 def _cells(line: str) -> list[str]:
-    """A comma is a point where it does not separate, and nothing is quoted, as thousands are."""
     separator = next((each for each in ";\t," if each in line), None)
     if separator and '"' in line:
-        return next(csv.reader([line], delimiter=separator))
-    return [cell.strip(" ,").replace(",", ".") for cell in line.split(separator)]
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
+    return [cell.strip().rstrip("," if separator != "," else "") for cell in line.split(separator)]
 
 
-def read_numbers(path: str) -> tuple[list[str], FloatArray]:
-    """(names of the columns from the lines before the first row of numbers, rows) of a text file with comma, semicolon, tab or blanks between cells.
-    Raises InputError, which names the line."""
-    rows: list[list[float]] = []
-    heads: list[list[str]] = []
-    count, wrong = 0, f"{path}: no row of numbers in it"
+class _Table:
+    """heads: lines before the first row of numbers; clocks: columns with dates or times of day; points: decimal points or commas."""
+
+    def __init__(self) -> None:
+        self.heads: list[list[str]] = []
+        self.rows: list[list[float]] = []
+        self.clocks: set[int] = set()
+        self.points: set[str] = set()
+        self.wrong = "it is empty"
+
+    def _numbers(self, cells: list[str]) -> list[float | None]:
+        self.points |= {point for point in ".," if any(point in cell and DECIMAL.fullmatch(cell) for cell in cells)}
+        if len(self.points) > 1:
+            raise ValueError("points and commas are both in numbers; write no thousands")
+        cells = [cell.replace(",", ".") if "," in cell and DECIMAL.fullmatch(cell) else cell for cell in cells]
+        try:
+            return [float(cell) for cell in cells]
+        except ValueError:
+            self.clocks |= {k for k, cell in enumerate(cells) if CLOCK.search(cell)}
+            return [_number(cell) for cell in cells]
+
+    def take(self, cells: list[str]) -> None:
+        """Raises ValueError."""
+        numbers = self._numbers(cells)
+        values = [each for each in numbers if each is not None]
+        is_first = not self.rows or (len(self.rows) == 1 and np.isfinite(self.rows[0]).sum() <= 1)  # a date, perhaps, above the table
+        if len(values) < len(cells):
+            text = printable(cells[numbers.index(None)][:40])
+            self.wrong = f'"{text}" is no number; leave the cell empty where there is none, or delete the line'
+            if not is_first or (numbers[0] is not None and np.isfinite(values).sum() > len(cells) / 2):
+                raise ValueError(self.wrong)
+        if len(values) < len(cells) or (is_first and not np.isfinite(values).any()):
+            self.heads.append(cells)
+            self.rows = []
+        elif not self.rows or len(values) == len(self.rows[0]):
+            self.rows.append(values)
+        elif is_first:
+            self.rows = [values]
+        else:
+            raise ValueError(f"{len(values)} cells, and {len(self.rows[0])} before; delete the line if it was cut")
+
+
+def read_numbers(path: str) -> tuple[list[str], FloatArray, set[int]]:
+    """(names of the columns from the lines before the first row of numbers, rows, columns of dates or times of day, in seconds) of a text file with
+    comma, semicolon, tab or blanks between cells. Raises InputError, which names the line."""
     try:
         data = sys.stdin.buffer.read() if path == "-" else pathlib.Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
     check_kind_of_file(path, data)
     lines = data.decode("utf-8-sig", "replace").splitlines()
+    found = _Table()
     with progress("reading") as show:
         for number, line in enumerate(lines, 1):
-            if not line.strip() or line.lstrip().startswith("#"):
-                continue
             if number % 1000 == 0:
                 show(number / len(lines))
-            cells = _cells(line)
-            if len(rows) == 1 and count <= 2 < len(cells):
-                rows = []  # a date above the table
-            try:
-                values = [_number(cell) for cell in cells]
-            except ValueError as error:
-                wrong = f"{path}:{number}: {error}"
-                if rows:
-                    raise InputError(wrong) from None
-                heads.append(cells)
-                continue
-            if rows and len(values) != count:
-                raise InputError(f"{path}:{number}: {len(values)} cells, and {count} before; delete the line if it was cut")
-            count = len(values)
-            rows.append(values)
-    if not rows:
-        raise InputError(wrong)
-    table = np.array(rows)
+            if line.strip() and not line.lstrip().startswith("#"):
+                try:
+                    found.take(_cells(line))
+                except (csv.Error, ValueError) as error:
+                    raise InputError(f"{path}:{number}: {error}") from None
+    if not found.rows:
+        raise InputError(f"{path}: no row of numbers in it; {found.wrong}")
+    table = np.array(found.rows)
     table = table[: np.flatnonzero(np.isfinite(table).any(axis=1)).max(initial=0) + 1]  # rows of separators may be behind it
-    return [" ".join(names).strip(" \"'") for names in zip(*(cells for cells in heads if len(cells) == count))], table
+    count = table.shape[1]
+    heads = [[*cells, ""] for cells in found.heads if len(cells) in (count, count - 1) and 2 * sum(map(bool, cells)) > len(cells)]
+    return [" ".join(names).strip() for names in zip(*heads)][:count], table, found.clocks
 
 
 def read_table(path: str, sensors: int, first: int | None, time: int | None, unit: str) -> tuple[FloatArray, FloatArray | None]:
     """(pressures [row, sensor], time [row] in seconds or None) of such a file. first, time: columns counted from 1. Raises InputError, and warns of
     columns that look like others."""
-    head, table = read_numbers(path)
-    if head and not head[-1] and np.isnan(table[:, -1]).all():  # each line ends with a separator
+    head, table, clocks = read_numbers(path)
+    ends = table.shape[1] > sensors and np.isnan(table[:, -1]).all()  # each line ends with a separator
+    if ends and not (head[-1] if head else table.shape[1] == sensors + 1 and _rises(table[:, 0])):
         head, table = head[:-1], table[:, :-1]
     count = table.shape[1]
     begin = count - sensors if first is None else first - 1
@@ -527,20 +567,20 @@ def read_table(path: str, sensors: int, first: int | None, time: int | None, uni
         raise InputError(f"{path}: column 1 of {count} would be the time, and does not rise after row {fallen[0]}; give --first N")
     for at in range(begin, begin + sensors):
         name = head[at] if head else ""
-        if NO_PRESSURE.fullmatch(name) or _rises(table[:, at]):
-            wrong = f'is "{printable(name)}", no pressure' if name else "rises evenly, as a time or a row's number"
+        if NO_PRESSURE.fullmatch(name) or at in clocks or _rises(table[:, at]):
+            what = "has times" if at in clocks else "rises evenly, as a time or a row's number"
+            wrong = f'is "{printable(name)}", no pressure' if NO_PRESSURE.fullmatch(name) else what
             raise InputError(f"{path}: column {at + 1}, of sensor {at - begin}, {wrong}; --first N is the column of sensor 0")
         if len(table) > 1 and np.ptp(table[:, at]) == 0.0:
             _warn(f"column {at + 1}, of sensor {at - begin}, never changes; leave its cells empty if the sensor is dead")
-    units = {found[1] for name in head[begin : begin + sensors] if (found := UNIT_NAMED.search(name))}
-    if units - {unit}:
+    units = {found[1] for name in head[begin : begin + sensors] if (found := UNIT_NAMED.search(name))} - {unit}
+    if units:
         _warn(f"columns are named as in {' or '.join(sorted(units))}, and read as {printable(unit)}; give --unit {min(units)} if they are")
     times = [at + 1 for at in range(count) if column is None and _rises(table[:, at])]
     if times:
         _warn(f"column {times[0]} rises evenly: a time? Give --time {times[0]}; without it each row is a held contact")
-    of_unit = TIME_NAMED.search(head[column - 1]) if head and column else None
-    second = (1e3 if of_unit[1] else 1e6) if of_unit else 1.0
-    return table[:, begin : begin + sensors], None if column is None else table[:, column - 1] / second
+    named = TIME_NAMED.search(head[column - 1].lower()) if head and column and column - 1 not in clocks else None
+    return table[:, begin : begin + sensors], None if column is None else table[:, column - 1] * (SECONDS[named[1]] if named else 1.0)
 
 
 def _recorded(options: argparse.Namespace) -> tuple[FloatArray, FloatArray, Mapping[str, Any]]:
@@ -574,7 +614,12 @@ def main(argv: list[str]) -> int:
     )
     parser.add_argument("--pad", metavar="NAME|FILE.json", help="one of the tool's, or a file that describes it; default: a recording's")
     parser.add_argument("--first", type=int, metavar="N", help="column of sensor 0, counted from 1; the others follow it")
-    parser.add_argument("--time", type=int, metavar="N", help="column of the time in seconds; without one each row is a contact of its own")
+    parser.add_argument(
+        "--time",
+        type=int,
+        metavar="N",
+        help="column of the time, in seconds, dates, or as its name has it (time_ms); without one each row is a contact of its own",
+    )
     parser.add_argument("--unit", default="Pa", metavar="UNIT", help=f"{', '.join(UNITS)}; default: Pa")
     parser.add_argument(
         "--zero", type=int, default=0, metavar="ROWS", help="number of rows at rest at the beginning: their mean is the zero"

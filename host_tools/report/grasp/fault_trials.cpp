@@ -58,7 +58,7 @@ constexpr Happening HAPPENINGS[] = {
     {"power lost", FaultKind::power, NONE, GRIP_GRIPPER_INACTIVE},
     {"no answers", FaultKind::unanswered, NONE, GRIP_GRIPPER_SILENT},
     {"no answers for 0.3 s", FaultKind::unanswered, NONE, 0, 0.3},
-    {"half is garbage", FaultKind::noisy},
+    {"half is lost", FaultKind::noisy},
     {"answers 30 ms late", FaultKind::late},
     {"object gone", FaultKind::taken},
 };

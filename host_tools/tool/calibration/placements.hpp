@@ -1,7 +1,8 @@
 /* Finds placements in a stream of frames: a weight was set down, rested, and was lifted again.
  *
  * Frames of any rate from 12 a second and any oversampling; all times are the frames' own. What touches the pad is
- * decided against the readings just before, so neither the firmware's gate nor the level of its zero matters. Its drift is taken off.
+ * decided against the readings just before, so neither the firmware's gate nor the level of its zero matters. The zero's drift is taken
+ * off.
  *
  * A contact begins where a reading rises by TOUCH_Pa within a second. It is a placement once it has rested for a second: then the mean of
  * the readings from 0.5 to 1 s is taken, above the mean of the half second before the contact. To rest means that over that time the

@@ -127,7 +127,8 @@ private:
 
   void rule() {
     bool denied = facts_.failure && facts_.failure->code == ErrorCode::permission_denied;
-    const bool simulated = facts_.failure ? facts_.failure->code == ErrorCode::not_simulated : facts_.info && is_simulated(*facts_.info);
+    const bool none = facts_.failure && facts_.failure->code == ErrorCode::not_simulated;
+    const bool simulated = none || (facts_.info && is_simulated(*facts_.info));
     if ((simulated || !facts_.is_plugged_in) && !denied) {
       return;
     }

@@ -296,8 +296,10 @@ class Fit(unittest.TestCase):
             joined([[f'"{cell}"' for cell in row] for row in rows]),
             joined([["t", *8 * ["Pa"]], *([str(100 * k), *row[1:]] for k, row in enumerate(rows))], first="Time (ms)"),
             joined(rows, end=",\n") + ",",
-            "2024-05-06\n" + joined(rows) + "N/A",
-            joined(clock),
+            "2024-05-06\nevery 10 ms,,,,,,,,\n" + joined(rows) + "N/A",
+            german.replace(";0,", ";,").replace("\n0,", "\n,"),
+            "\n".join(",".join(row) + "," for row in rows).replace("nan", ""),
+            joined(clock, first="Time (hh:mm:ss.ms)"),
             joined([[row[0][11:], *row[1:]] for row in clock]),
         ):
             with self.subTest(text[:30]), tempfile.NamedTemporaryFile() as file:
@@ -305,12 +307,14 @@ class Fit(unittest.TestCase):
                 pressures, time_s = read_table(file.name, 8, None, None, "Pa")
                 np.testing.assert_array_equal(pressures, wanted[:, 1:])
                 np.testing.assert_allclose(time_s - time_s[0], wanted[:, 0], atol=1e-6)
-                self.assertWarnsRegex(UserWarning, "named as in Pa, and read as kPa", read_table, file.name, 8, None, None, "kPa")
+                if "p0 [Pa]" in text:
+                    self.assertWarnsRegex(UserWarning, "named as in Pa, and read as kPa", read_table, file.name, 8, None, None, "kPa")
         for data, words in (
             (german.encode("utf-16"), "text in UTF-16"),
             (b"\x93NUMPY\1", "save them as CSV"),
-            (german.replace(";", ";1.").encode(), ':11: "1.[0-9.]*" is no number'),
-            (joined(rows).replace("\n", "\nt:").encode(), ':11: "t:0.9" is no number'),
+            (german.replace(";", ";1.").encode(), 'no row of numbers in it; "1.[0-9,]*" is no number'),
+            (german.replace(";", ";1.0;", 20).encode(), "points and commas are both in numbers"),
+            (joined([[*row[:5], "OVF", *row[6:]] if k == 0 else row for k, row in enumerate(rows)]).encode(), ':2: "OVF" is no number'),
         ):
             with tempfile.NamedTemporaryFile() as file:
                 pathlib.Path(file.name).write_bytes(data)

@@ -246,9 +246,12 @@ TEST(Solver, finds_what_remains_of_the_placements_before) {
   set_earlier(placements);
   auto remembering = placements;
   for (std::size_t k = 0; k < 15; k++) {
-    EXPECT_EQ(placements[0].earlier_Pa[k], 0.0);
-    const double was = std::max(placements[0].reading_Pa[k], 0.0), now = std::max(placements[1].reading_Pa[k], 0.0);
-    EXPECT_NEAR(placements[1].earlier_Pa[k], was / M_E - std::max(was * std::exp(-1 - RESTED_BEFORE_s / LET_GO_s) - now, 0.0), 1e-9);
+    double most_Pa = 0.0;
+    for (std::size_t i = 0; i < 3; i++) {
+      const double rest_Pa = most_Pa / M_E, reading_Pa = std::max(placements[i].reading_Pa[k], 0.0);
+      most_Pa = std::max(rest_Pa * std::exp(-RESTED_BEFORE_s / LET_GO_s), reading_Pa);
+      EXPECT_NEAR(placements[i].earlier_Pa[k], rest_Pa - most_Pa + reading_Pa, 1e-9);
+    }
     for (std::size_t i = 0; i < 30; i++) {
       remembering[i].reading_Pa[k] -= 0.01 * (static_cast<double>(k % 5) - 2.0) * placements[i].earlier_Pa[k];
     }

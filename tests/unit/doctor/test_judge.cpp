@@ -282,7 +282,6 @@ TEST(Judge, WhatIsNoFaultIsNotNamed) {
   Facts simulated = good();
   set_board(simulated, "native");
   simulated.rule.clear();
-  simulated.is_plugged_in = false;
   EXPECT_TRUE(wrong(simulated).empty());
 }
 
