@@ -29,7 +29,7 @@ class Grid:
     """One recording. xy [press, 2] in mm of the layout's frame, reading_Pa [press, 8], judged [press]: not of a row that aligns."""
 
     def __init__(self, path, pitch_mm):
-        _, table = read_numbers(path)
+        _, table, _ = read_numbers(path)
         if table.shape[1] != 10:
             raise InputError(f"{path}: rows are not x, y and eight readings")
         stage, self.reading_Pa = table[:, :2], table[:, 2:] * PA_PER_PSI
