@@ -17,8 +17,8 @@ COMMANDS = ("plot", "scenario", "evaluate", "fit", "validate", "ros2", "ros2_gri
 
 
 def _tool(name: str) -> Callable[[], int]:
-    says = {"fit": "fingertip fit", "validate": "fingertip"}.get(name, f"fingertip-{name.replace('_', '-')}")
-    return functools.partial(run_tool, says, importlib.import_module(f"fingertip.{name}").main)
+    called = {"fit": "fingertip fit", "validate": "fingertip"}.get(name, f"fingertip-{name.replace('_', '-')}")
+    return functools.partial(run_tool, called, importlib.import_module(f"fingertip.{name}").main)
 
 
 def command() -> Callable[[], int]:

@@ -6,15 +6,12 @@ plt.plot(found["x_mm"], found["y_mm"], ".")
 
 import argparse
 import contextlib
-import csv
-import datetime
 import functools
 import itertools
 import json
 import math
 import os
 import pathlib
-import re
 import shutil
 import sys
 import warnings
@@ -28,13 +25,13 @@ from .arrays import Firmware, MeasureError, q10, round_half_away, table_of, usab
 from .command import Parser, check_output, printable, progress, reporter
 from .errors import InputError
 from .evaluate import add_recording_options, check_time, load_recording
-from .files import check_kind_of_file, is_recording, write_text
+from .files import is_recording, write_text
+from .frames import FloatArray
 from .line import SENSORS_MAX, Flag
+from .tables import UNITS, read_table
 
-FloatArray = npt.NDArray[np.float64]
 Described = str | os.PathLike[str] | Mapping[str, Any]
 
-UNITS = {"Pa": 1.0, "hPa": 100.0, "kPa": 1000.0, "mbar": 100.0, "bar": 1e5, "psi": 6894.757, "mmHg": 133.322}
 SHAPES = ("undecided", "round", "pulled", "elongated", "two", "none")
 NOISE_Pa = 10.0
 ROWS_AT_ONCE = 512
@@ -49,13 +46,6 @@ LEAST = dict.fromkeys(
 )  # of a calibration
 LEAST |= {"gain": 1e-3, "off_x_mm": -1e3, "off_y_mm": -1e3, "wider": -1e3}
 OF_SENSORS = ("gain", "gain_sd", "off_x_mm", "off_y_mm", "wider")
-NO_PRESSURE = re.compile(r"(t|x|y|z|f|q[xyz]?|time|temp[0-9]*|temperature[0-9]*|force|row|frame|index)([_ (\[].*)?", re.IGNORECASE)
-UNIT_NAMED = re.compile(rf"(?<![A-Za-z])({'|'.join(UNITS)})(?![A-Za-z])")
-SECONDS = {"milli": 1e-3, "m": 1e-3, "micro": 1e-6, "u": 1e-6, "\u00b5": 1e-6, "\u03bc": 1e-6, "\ufffd": 1e-6, "nano": 1e-9, "n": 1e-9}
-TIME_NAMED = re.compile(rf"(?<![a-z])({'|'.join(SECONDS)})s(?:ecs?|econds?)?(?![a-z])")
-CLOCK = re.compile(r"\d:\d|\d{4}-\d\d-\d\d")
-DECIMAL = re.compile(r"[-+]?\d*([.,])\d+(?:[eE][-+]?\d+)?")
-MISSING = ("", "na", "n/a", "#n/a", "null", "none", "-", "--")  # as programs write a cell that has no number
 PLACEMENT_Pa, PLACEMENTS, EVERY_s = 1500.0, 40, 8.0  # of a calibration: readings lighter than this are no placement
 
 
@@ -217,7 +207,6 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
         table = table - zero_Pa
     most, least = np.nanmax(table), np.nanmin(table)
     where_most, where_least = (f" (row {row + 1}, sensor {k})" for row, k in (np.argwhere(table == value)[0] for value in (most, least)))
-    others = np.flatnonzero((level_Pa < 0.5 * middle_Pa) & (middle_Pa > ABSOLUTE_Pa))
     wrong = ""
     if airs and unit not in airs:
         wrong = f"readings at rest are {middle_Pa / UNITS[unit]:.4g} {unit}, as the air's in {' or '.join(airs)}; give that unit"
@@ -233,10 +222,8 @@ def _readings(pressures: npt.ArrayLike, pad: Pad, unit: str, zero_rows: int, noi
         wrong = f"a reading moves by {touch_Pa:.0f} Pa in the {zero_rows} rows at rest: something touches; give fewer rows (zero)"
     if wrong:
         raise InputError(wrong)
-    if len(others):
-        _warn(
-            f"sensor {np.flatnonzero(seen)[others[0]]} is at {level_Pa[others[0]]:.4g} Pa, and others at {middle_Pa:.0f} Pa: is that column a pressure?"
-        )
+    if len(others := np.flatnonzero((level_Pa < 0.5 * middle_Pa) & (middle_Pa > ABSOLUTE_Pa))):
+        _warn(f"sensor {np.flatnonzero(seen)[others[0]]} is at {level_Pa[others[0]]:.4g} Pa, others at {middle_Pa:.0f} Pa: a pressure?")
     if scatter_Pa > 2 * noise_Pa:
         _warn(f"readings scatter by {scatter_Pa:.0f} Pa from row to row; give that as the noise, which is {noise_Pa:g} Pa")
     if most < LIGHT_Pa:
@@ -456,133 +443,6 @@ def calibrate(
     return response_of(found, sensors) | ({} if force_N else {"force_scale": 0.0, "force_scale_sd": 0.0})
 
 
-def _number(cell: str) -> float | None:
-    """Seconds of a date or a time of day, NaN of a cell that has none; None: no number."""
-    with contextlib.suppress(ValueError):
-        return float(cell)
-    if cell.lower() in MISSING:
-        return math.nan
-    if not CLOCK.search(cell):
-        return None
-    text = re.sub(r"[.,](\d+)", lambda found: f".{found[1][:6]:0<6}", cell).replace("Z", "+00:00")
-    with contextlib.suppress(ValueError):
-        moment = datetime.datetime.fromisoformat(text if "-" in text else f"1970-01-01 {text}")
-        return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.timezone.utc)).timestamp()
-    return None
-
-
-def _cells(line: str) -> list[str]:
-    separator = next((each for each in ";\t," if each in line), None)
-    if separator and '"' in line:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
-    return [cell.strip().rstrip("," if separator != "," else "") for cell in line.split(separator)]
-
-
-class _Table:
-    """heads: lines before the first row of numbers; clocks: columns with dates or times of day; points: decimal points or commas."""
-
-    def __init__(self) -> None:
-        self.heads: list[list[str]] = []
-        self.rows: list[list[float]] = []
-        self.clocks: set[int] = set()
-        self.points: set[str] = set()
-        self.wrong = "it is empty"
-
-    def _numbers(self, cells: list[str]) -> list[float | None]:
-        self.points |= {point for point in ".," if any(point in cell and DECIMAL.fullmatch(cell) for cell in cells)}
-        if len(self.points) > 1:
-            raise ValueError("points and commas are both in numbers; write no thousands")
-        cells = [cell.replace(",", ".") if "," in cell and DECIMAL.fullmatch(cell) else cell for cell in cells]
-        try:
-            return [float(cell) for cell in cells]
-        except ValueError:
-            self.clocks |= {k for k, cell in enumerate(cells) if CLOCK.search(cell)}
-            return [_number(cell) for cell in cells]
-
-    def take(self, cells: list[str]) -> None:
-        """Raises ValueError."""
-        numbers = self._numbers(cells)
-        values = [each for each in numbers if each is not None]
-        is_first = not self.rows or (len(self.rows) == 1 and np.isfinite(self.rows[0]).sum() <= 1)  # a date, perhaps, above the table
-        if len(values) < len(cells):
-            text = printable(cells[numbers.index(None)][:40])
-            self.wrong = f'"{text}" is no number; leave the cell empty where there is none, or delete the line'
-            if not is_first or (numbers[0] is not None and np.isfinite(values).sum() > len(cells) / 2):
-                raise ValueError(self.wrong)
-        if len(values) < len(cells) or (is_first and not np.isfinite(values).any()):
-            self.heads.append(cells)
-            self.rows = []
-        elif not self.rows or len(values) == len(self.rows[0]):
-            self.rows.append(values)
-        elif is_first:
-            self.rows = [values]
-        else:
-            raise ValueError(f"{len(values)} cells, and {len(self.rows[0])} before; delete the line if it was cut")
-
-
-def read_numbers(path: str) -> tuple[list[str], FloatArray, set[int]]:
-    """(names of the columns from the lines before the first row of numbers, rows, columns of dates or times of day, in seconds) of a text file with
-    comma, semicolon, tab or blanks between cells. Raises InputError, which names the line."""
-    try:
-        data = sys.stdin.buffer.read() if path == "-" else pathlib.Path(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}") from None
-    check_kind_of_file(path, data)
-    lines = data.decode("utf-8-sig", "replace").splitlines()
-    found = _Table()
-    with progress("reading") as show:
-        for number, line in enumerate(lines, 1):
-            if number % 1000 == 0:
-                show(number / len(lines))
-            if line.strip() and not line.lstrip().startswith("#"):
-                try:
-                    found.take(_cells(line))
-                except (csv.Error, ValueError) as error:
-                    raise InputError(f"{path}:{number}: {error}") from None
-    if not found.rows:
-        raise InputError(f"{path}: no row of numbers in it; {found.wrong}")
-    table = np.array(found.rows)
-    table = table[: np.flatnonzero(np.isfinite(table).any(axis=1)).max(initial=0) + 1]  # rows of separators may be behind it
-    count = table.shape[1]
-    heads = [[*cells, ""] for cells in found.heads if len(cells) in (count, count - 1) and 2 * sum(map(bool, cells)) > len(cells)]
-    return [" ".join(names).strip() for names in zip(*heads)][:count], table, found.clocks
-
-
-def read_table(path: str, sensors: int, first: int | None, time: int | None, unit: str) -> tuple[FloatArray, FloatArray | None]:
-    """(pressures [row, sensor], time [row] in seconds or None) of such a file. first, time: columns counted from 1. Raises InputError, and warns of
-    columns that look like others."""
-    head, table, clocks = read_numbers(path)
-    ends = table.shape[1] > sensors and np.isnan(table[:, -1]).all()  # each line ends with a separator
-    if ends and not (head[-1] if head else table.shape[1] == sensors + 1 and _rises(table[:, 0])):
-        head, table = head[:-1], table[:, :-1]
-    count = table.shape[1]
-    begin = count - sensors if first is None else first - 1
-    if begin < 0 or begin + sensors > count or (first is None and begin > 1) or not 0 <= (time or 1) - 1 < count:
-        raise InputError(
-            f"{path}: {count} columns, and the pad has {sensors} sensors; give their columns, or the time and those, or --first N, the column of "
-            "sensor 0, and --time N"
-        )
-    column = time if time is not None else 1 if first is None and begin == 1 else None
-    if time is None and column and len(fallen := 1 + np.flatnonzero(~(np.diff(table[:, 0]) > 0))):
-        raise InputError(f"{path}: column 1 of {count} would be the time, and does not rise after row {fallen[0]}; give --first N")
-    for at in range(begin, begin + sensors):
-        name = head[at] if head else ""
-        if NO_PRESSURE.fullmatch(name) or at in clocks or _rises(table[:, at]):
-            what = "has times" if at in clocks else "rises evenly, as a time or a row's number"
-            wrong = f'is "{printable(name)}", no pressure' if NO_PRESSURE.fullmatch(name) else what
-            raise InputError(f"{path}: column {at + 1}, of sensor {at - begin}, {wrong}; --first N is the column of sensor 0")
-        if len(table) > 1 and np.ptp(table[:, at]) == 0.0:
-            _warn(f"column {at + 1}, of sensor {at - begin}, never changes; leave its cells empty if the sensor is dead")
-    units = {found[1] for name in head[begin : begin + sensors] if (found := UNIT_NAMED.search(name))} - {unit}
-    if units:
-        _warn(f"columns are named as in {' or '.join(sorted(units))}, and read as {printable(unit)}; give --unit {min(units)} if they are")
-    times = [at + 1 for at in range(count) if column is None and _rises(table[:, at])]
-    if times:
-        _warn(f"column {times[0]} rises evenly: a time? Give --time {times[0]}; without it each row is a held contact")
-    named = TIME_NAMED.search(head[column - 1].lower()) if head and column and column - 1 not in clocks else None
-    return table[:, begin : begin + sensors], None if column is None else table[:, column - 1] * (SECONDS[named[1]] if named else 1.0)
-
-
 def _recorded(options: argparse.Namespace) -> tuple[FloatArray, FloatArray, Mapping[str, Any]]:
     """(Pa above the fingertip's own zero [row, sensor], time, pad) of a recording. Frames without pressures of their own (lost or held) are
     left out."""
@@ -596,34 +456,18 @@ def _recorded(options: argparse.Namespace) -> tuple[FloatArray, FloatArray, Mapp
         raise InputError(f"{options.recording}: has no pressures; record with the raw stream on")
     places = [[float(each) for each in known.get(name, "").split()] for name in ("x_mm", "y_mm")]
     rubber = {name: known.get(f"pad_{name}", 0) for name in ("thickness_mm", "overhang_mm")}
-    name = known.get("serial", options.recording)
-    pad = {"name": name, "pitch_mm": known.get("pitch_mm"), "places_mm": list(zip(*places)), "rubber": rubber}
-    return pressures[there], recording["t_us"][there] / 1e6, pad
-
-
-def _rises(values: FloatArray) -> bool:
-    """Evenly, but for gaps."""
-    steps = np.diff(values)
-    return len(steps) >= 8 and bool((steps > 0).all() and np.quantile(steps, 0.9) < 1.5 * np.quantile(steps, 0.1))
+    pad = {"pitch_mm": known.get("pitch_mm"), "places_mm": list(zip(*places)), "rubber": rubber}
+    return pressures[there], recording["t_us"][there] / 1e6, {"name": known.get("serial", options.recording)} | pad
 
 
 def main(argv: list[str]) -> int:
     parser = Parser(prog="fingertip fit", description=(__doc__ or "").split(":")[0] + ".", allow_abbrev=False)
-    parser.add_argument(
-        "recording", metavar="FILE.csv", help="a column for each sensor, perhaps one of the time before; or a recording; -: standard input"
-    )
+    parser.add_argument("recording", metavar="FILE.csv", help="a column a sensor, the time before them; or a recording; -: standard input")
     parser.add_argument("--pad", metavar="NAME|FILE.json", help="one of the tool's, or a file that describes it; default: a recording's")
     parser.add_argument("--first", type=int, metavar="N", help="column of sensor 0, counted from 1; the others follow it")
-    parser.add_argument(
-        "--time",
-        type=int,
-        metavar="N",
-        help="column of the time, in seconds, dates, or as its name has it (time_ms); without one each row is a contact of its own",
-    )
+    parser.add_argument("--time", type=int, metavar="N", help="its column: seconds, dates, or as its name has it (time_ms); default: none")
     parser.add_argument("--unit", default="Pa", metavar="UNIT", help=f"{', '.join(UNITS)}; default: Pa")
-    parser.add_argument(
-        "--zero", type=int, default=0, metavar="ROWS", help="number of rows at rest at the beginning: their mean is the zero"
-    )
+    parser.add_argument("--zero", type=int, default=0, metavar="ROWS", help="that are at rest at the beginning: their mean is the zero")
     parser.add_argument("--noise", type=float, default=NOISE_Pa, metavar="PA", help="of a reading, rms; default: %(default)g")
     parser.add_argument("--calibration", metavar="FILE.json", help="what fingertip calibrate --pad wrote")
     parser.add_argument("--calibrate", action="store_true", help="find the gains instead: fingertip calibrate --from FILE --pad NAME")

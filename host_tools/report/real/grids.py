@@ -9,8 +9,9 @@ import dataclasses
 import fingertip
 import numpy as np
 from fingertip.files import InputError
-from fingertip.fit import inputs, read_numbers, read_pad, response_of
+from fingertip.fit import inputs, read_pad, response_of
 from fingertip.line import WARNINGS, Flag
+from fingertip.tables import read_numbers
 
 PA_PER_PSI = 6894.757
 NOISE_PA = 10.0  # of a mean of ten samples, whose steps are 20 Pa
