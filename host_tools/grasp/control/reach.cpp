@@ -29,7 +29,7 @@ constexpr double SHORT_mm = 0.5;       // length of a short move
 constexpr double OPENS_mm = 0.3;       // largest single opening
 // A set force may be off by this number of steps: more than half a step, or the gripper would oscillate.
 constexpr double OFF = 0.65;
-// Distance from the cap in standard deviations of a fingertip's force, which are limited to these shares of it.
+// Distance from the cap in standard deviations of a force, limited to these shares of it: UNCERTAIN contacts report too much.
 constexpr double SDS = 2.5, SD_LEAST = 0.04, SD_MOST = 0.06;
 
 // Upper limit of the larger of both true forces.

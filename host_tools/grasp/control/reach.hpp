@@ -28,7 +28,7 @@ public:
   double width_for(double wanted_N, double force_N, double from_mm) const;
   // The furthest width that a force at this one justifies: it doubles the indentation.
   double furthest_mm(double from_mm) const;
-  // A pair of force and width, both at rest.
+  // Learns from force and width at rest.
   void learn(double force_N, double width_mm);
 
 private:

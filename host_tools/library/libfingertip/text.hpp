@@ -12,7 +12,7 @@ namespace fingertip {
 
 /* The shortest text that reads back as the same number. */
 std::string shortest(float value);
-/* The number with these digits after the point. */
+/* The number with `digits` digits after the point. */
 std::string fixed(double value, int digits);
 
 /* Nothing unless all of the text is one finite number of that type. */
