@@ -1,7 +1,6 @@
 """Where the parts of a circuit board lie, and what is connected: from its descriptor, the sensors' places and the base plate's measures.
 
 Millimetres from the pad's middle, x to the right and y down, seen from the front (the sensors' y is up). What is higher than a sensor lies on the back.
-
 Lands with a name of KiCad 6.0.11's library have its figures. boards/BUILD.md ("What to check first") has where sensor and Pico have theirs from.
 """
 

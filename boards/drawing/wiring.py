@@ -9,13 +9,13 @@ import sheet
 from sheet import path, text
 
 SYNC = "the [sync pin](../../host_tools/README.md#a-clock-that-cameras-share), 3.3 V; leave it open if there is no camera"
-MUX_CHANNELS, MUX_ADDRESS = 8, 0x70  # of a TCA9548A; the address with A2, A1, A0 low
+MUX_ADDRESS = 0x70  # of a TCA9548A with A2, A1, A0 low
 LEAST_ohm = (3.3 - 0.4) / 3e-3  # of all pull-ups of a line: UM10204 has 0.4 V at 3 mA
 SENSOR_PADS = {"GND": 1, "VDD": 2, "SCL": 3, "SDA": 4}  # of an MS5840-02BA, as public boards have them: MTL_BaroTactile_MS5840 (BUILD.md)
 
 
 class Unwired(Exception):
-    """The descriptor is of no board that can be drawn."""
+    """The descriptor is of no board that can be drawn. cmake/boards.cmake judges its pins and addresses."""
 
 
 @dataclasses.dataclass
@@ -54,16 +54,6 @@ def board_of(name, descriptor, root=geometry.ROOT):
     missing = [key for key in needed if key not in board.pull_ups_ohm]
     if missing:
         raise Unwired(f"boards/{name}/board.json: pull_ups_ohm has no {missing[0]}; add its resistance in ohms")
-    if board.bus == "multiplexed" and board.wiring["sensors_of_strip"] > MUX_CHANNELS:
-        raise Unwired(
-            f"boards/{name}/board.json: {board.wiring['sensors_of_strip']} sensors of a strip, and a TCA9548A has {MUX_CHANNELS} channels"
-        )
-    used = gpios(board)
-    for gpio in used:
-        if f"GP{gpio}" not in pico.PINS:
-            raise Unwired(f"boards/{name}/board.json: a Pico has no pin for GPIO {gpio}")
-    if len(set(used)) != len(used):
-        raise Unwired(f"boards/{name}/board.json: GPIO {next(gpio for gpio in used if used.count(gpio) > 1)} has two wires")
     ohm = board.pull_ups_ohm
     least_ohm = min(ohm.values()) if board.bus == "parallel" else 1 / (1 / ohm["bus"] + board.sensors / ohm["channel"])
     if least_ohm < LEAST_ohm:

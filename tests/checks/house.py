@@ -55,7 +55,7 @@ LIMITS = {
     "private_words": (11, 11),
     "unformatted_files": (0, 0),
     "longest_function_lines": (60, 60),
-    "board_lines": (897, 897),
+    "board_lines": (894, 894),
     "app_ifs": (1, 1),
 }
 APART = ("firmware/fit/", "firmware/condition/")  # from longest_file
