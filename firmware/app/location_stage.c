@@ -39,7 +39,7 @@ void location_stage_start(struct location_stage *stage) {
   stage->settings.location_sd_limit_mm = DEFAULT_LOCATION_LIMIT_mm;
 }
 
-void location_stage_process(struct location_stage *stage, const int32_t *past_sd_Pa_q10, struct findings *found) {
+void location_stage_process(struct location_stage *stage, const int32_t *hysteresis_sd_Pa_q10, struct findings *found) {
   const uint32_t t_us = (uint32_t)found->frame.t_us;
   if (!found->conditioned.contact || t_us - stage->frame_us >= OUTLIER_EACH_FRAME_us) {
     memset(&stage->outliers, 0, sizeof stage->outliers);
@@ -47,7 +47,7 @@ void location_stage_process(struct location_stage *stage, const int32_t *past_sd
   stage->frame_us = t_us;
   if (found->conditioned.contact) {
     stage->settings.noise_Pa_q10 = found->frame.noise_Pa_q10;
-    memcpy(stage->settings.past_sd_Pa_q10, past_sd_Pa_q10, sizeof stage->settings.past_sd_Pa_q10);
+    memcpy(stage->settings.hysteresis_sd_Pa_q10, hysteresis_sd_Pa_q10, sizeof stage->settings.hysteresis_sd_Pa_q10);
     FIT(&stage->array, found->conditioned.pressure_Pa_q10, found->conditioned.usable, &stage->settings, &stage->outliers, &found->fit);
     stage->failures += !(found->fit.flags & CONTACT_FLAG_FIT_VALID);
   } else {
@@ -87,7 +87,7 @@ static void set_shape(struct location_stage *stage) {
   settings->prior_width_mm = is_set ? stage->prior_sd_mm : has_prior ? millimetres(calibration->sigma_sd_um) : 0.0f;
   settings->dip_share = calibration ? (1.0f / 65536.0f) * (float)calibration->dip_share_q16 : 0.0f;
   settings->dip_sd_mm = calibration ? millimetres(calibration->dip_sd_um) : 0.0f;
-  settings->cut_noises = stage->has_profile ? 0 : DEFAULT_CUT_NOISES;
+  settings->clip_below_sds = stage->has_profile ? 0 : DEFAULT_CLIP_BELOW_SDS;
 }
 
 enum ft_status location_stage_set_prior(struct location_stage *stage, float sigma_mm, float sd_mm) {

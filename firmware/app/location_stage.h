@@ -21,8 +21,8 @@ struct location_stage {
 
 void location_stage_start(struct location_stage *stage);
 
-/* past_sd_Pa_q10: of each sensor, as condition.h has it. */
-void location_stage_process(struct location_stage *stage, const int32_t *past_sd_Pa_q10, struct findings *found);
+/* hysteresis_sd_Pa_q10: of each sensor, as condition.h has it. */
+void location_stage_process(struct location_stage *stage, const int32_t *hysteresis_sd_Pa_q10, struct findings *found);
 
 /* Scales the force. */
 void location_stage_set_force(const struct contact_settings *contact, struct findings *found);

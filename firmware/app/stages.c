@@ -42,7 +42,7 @@ static void fit_readings(struct stages *stages, struct findings *found) {
   condition_stage_process(&stages->condition, found);
 #if FT_WITH_FIT
   begin(found, CRASH_AT_FIT);
-  location_stage_process(&stages->location, stages->condition.condition.past_sd_Pa_q10, found);
+  location_stage_process(&stages->location, stages->condition.condition.hysteresis_sd_Pa_q10, found);
 #endif
 #if FT_WITH_TANGENTIAL
   jobs_begin_frame(&stages->jobs, found->frame.t_us);

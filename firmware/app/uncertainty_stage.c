@@ -11,7 +11,7 @@ static bool is_estimated(const struct findings *found) { return found->tangentia
 
 void uncertainty_stage_process(const struct uncertainty_stage *stage, const struct location_stage *location, struct findings *found) {
   if (found->conditioned.contact && !is_estimated(found)) {
-    fit_bias_widen(&stage->force, &location->array, &location->settings, &found->fit);
+    fit_bias_add(&stage->force, &location->array, &location->settings, &found->fit);
     found->contact.flags |= found->fit.flags & CONTACT_FLAG_UNCERTAIN;
   }
 }

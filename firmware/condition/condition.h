@@ -26,12 +26,12 @@
  * as a press. Then a sudden press opens the gate above half of the band, and the level takes over the remainder slowly.
  * - A long contact leaves a drift too, as far as a barometer may have drifted in it.
  *
- * Past: what rubber keeps shows at rest, and goes on for 1 to 4 s in the next contact.
- * - A sensor keeps a share of what it has let go of: of by how much it was pressed more than now, fading with LET_GO_ms. This share, of
- * either sign, and where the sensor rests are learnt together from what is left after contacts (ZERO.md). In a contact it is taken off.
- * What else the zero was off at the touch fades. The gate does not know of it: there it would hide a force.
- * - That share is uncertain, and so is what a hold itself changes in this sensor alone: past_sd_Pa_q10 is the sd of both. The first is a
- * part of what it has let go of. The second rises in a hold and fades with PAST_ms; its share is the size of what is left after contacts.
+ * Hysteresis: what rubber keeps of a press shows at rest, and goes on for 1 to 4 s in the next contact.
+ * - A sensor retains a share of the pressure that was released: of by how much it was pressed more than now, fading with RELEASED_ms. This
+ * share, of either sign, and where the sensor rests are learnt together from what is left after contacts (ZERO.md). In a contact it is
+ * taken off. What else the zero was off at the touch fades. The gate does not know of it: there it would hide a force.
+ * - That share is uncertain, and so is what a hold itself changes in this sensor alone: hysteresis_sd_Pa_q10 is the sd of both. The first
+ * is a part of what was released. The second rises in a hold and fades with HOLD_ms; its share is the size of what is left after contacts.
  *
  * The level of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
  * is taken again if it was taken in the five seconds before its sensor was reset as it had lost its state, or stepped
@@ -70,15 +70,15 @@ struct gate {
 /* All that is remembered of one sensor. */
 struct condition_sensor {
   int32_t level_Pa_q10;
-  int32_t rests_Pa_q10;        /* where the zero goes in a contact, once what rubber keeps has faded */
-  int32_t spread_Pa_q10;       /* 0: settled */
-  int32_t memory_Pa_q10;       /* strongest press, fading */
-  int32_t reached_Pa_q10;      /* the same of this contact alone */
-  int32_t past_Pa_q10;         /* the hold, through a low pass of 3 s */
-  int32_t past_share;          /* sd of what it changes, 1 / 2^16: the size of what is left after contacts */
-  int32_t keeps_share, learnt; /* mean of the same, of either sign, of as many releases, KEEPS_LEARNT_MOST at most */
-  int32_t let_go_Pa_q10;       /* by which it was pressed more than now; fades in 2 s */
-  int32_t kept_Pa_q10;         /* let_go times keeps_share, which faded_Pa_q10 is less by */
+  int32_t rests_Pa_q10;         /* where the zero goes in a contact, once what rubber keeps has faded */
+  int32_t spread_Pa_q10;        /* 0: settled */
+  int32_t memory_Pa_q10;        /* strongest press, fading */
+  int32_t reached_Pa_q10;       /* the same of this contact alone */
+  int32_t held_Pa_q10;          /* the hold, through a low pass of 3 s */
+  int32_t hysteresis_q16;       /* sd of what it changes, 1 / 2^16: the size of what is left after contacts */
+  int32_t retained_q16, learnt; /* mean of the same, of either sign, of as many releases, RETAINED_LEARNT_MOST at most */
+  int32_t released_Pa_q10;      /* by which it was pressed more than now; fades in 2 s */
+  int32_t retained_Pa_q10;      /* released times retained_q16, which faded_Pa_q10 is less by */
   int32_t wander_Pa_q10;
   int32_t taken_Pa_q10;
   int32_t crept_Pa_q10;   /* risen slowly */
@@ -110,7 +110,7 @@ struct condition {
   sensor_map below;      /* bitmap: too far below zero */
   sensor_map firm;       /* bitmap: stronger than what the zero has wandered */
   sensor_map sudden;     /* bitmap: stronger than what may have crept up */
-  sensor_map to_learn;   /* bitmap: a contact has ended, and its past_share has not learnt from it */
+  sensor_map to_learn;   /* bitmap: a contact has ended, and its hysteresis_q16 has not learnt from it */
   sensor_map zero_risen; /* bitmap: the zero has taken more than opens the gate */
 
   /* Of the whole pad. */
@@ -122,12 +122,12 @@ struct condition {
   struct gate gate;
   struct calm calm;
 
-  int32_t zero_Pa_q10[FT_MAX_SENSORS];    /* [sensor] 1/1024 Pa, as all here: level + remainder */
-  int32_t faded_Pa_q10[FT_MAX_SENSORS];   /* of the remainder, in this contact, less what the rubber has kept of it */
-  int32_t margin_Pa_q10[FT_MAX_SENSORS];  /* by which the gate is higher */
-  int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* of a reading: what a press before and this hold leave in it */
-  int32_t sum_Pa_q10[FT_MAX_SENSORS];     /* of readings above the zero, since the last update */
-  uint8_t summed[FT_MAX_SENSORS];         /* readings in the sum */
+  int32_t zero_Pa_q10[FT_MAX_SENSORS];          /* [sensor] 1/1024 Pa, as all here: level + remainder */
+  int32_t faded_Pa_q10[FT_MAX_SENSORS];         /* of the remainder, in this contact, less what the rubber has kept of it */
+  int32_t margin_Pa_q10[FT_MAX_SENSORS];        /* by which the gate is higher */
+  int32_t hysteresis_sd_Pa_q10[FT_MAX_SENSORS]; /* of a reading: what a press before and this hold leave in it */
+  int32_t sum_Pa_q10[FT_MAX_SENSORS];           /* of readings above the zero, since the last update */
+  uint8_t summed[FT_MAX_SENSORS];               /* readings in the sum */
   struct condition_sensor sensor[FT_MAX_SENSORS];
 };
 

@@ -52,34 +52,34 @@
 #define BULGE_SHIFT 3                  /* an eighth of a press: what is less may be rubber that bulged beside it; defaults.h: 1.5 % */
 
 /* What rubber keeps of a press (strips: 0.4 to 13 % above, 1 to 15 % below, for 0.5 to 20 s). */
-#define MEMORY_ms SECONDS(20)             /* time constant of the memory */
-#define SATURATED_Pa 100000               /* counts for a press beyond the range of a sensor */
-#define BESIDE_SHIFT 7                    /* 0.8 kPa: what the sensor beside it measures at least, at a width of a third of the pitch */
-#define BAND_SHIFT 3                      /* an eighth of the memory may remain; ZERO.md: a sixteenth and a quarter fail */
-#define DIP_SHIFT 2                       /* a quarter may be missing */
-#define REOPEN_SHIFT 4                    /* a sixteenth: what a sudden press must exceed after FRESH_ms */
-#define PAST_ms SECONDS(3)                /* time constant of a hold's own part; strips: 1 to 4 s */
-#define LET_GO_ms SECONDS(2)              /* of what is let go of, and so of what is kept; strips: the middle of 1 to 4 s */
-#define PAST_SHARE 1311                   /* 2 % is the sd until releases show it; the twin's after-effect: 2.3 % rms */
-#define PAST_SHARE_LEAST 328              /* 0.5 %: releases may hide it (pads 21 to 24, gains alone) */
-#define PAST_SHARE_MOST 16384             /* a quarter; range */
-#define PAST_SHARE_FORCE 3277             /* a twentieth: twice the sd that it shows is the band of all, an eighth */
-#define PAST_SHOWS_ms ((uint32_t)MS(200)) /* after a contact; the remainder follows in 100 ms */
-#define PAST_LEAST_Pa 1000                /* less shows nothing beside noise and drift */
-#define PAST_HIDES_Pa 32                  /* of more the zero has too much for a sensor to rest there; choice */
-#define PAST_LEARN_SHIFT 2                /* a quarter of what each release shows; choice */
-#define KEEPS_LEARNT_MOST 16              /* releases in the mean of what it keeps; twin, seeds 101 to 104 */
-#define KEEPS_SURE_SHIFT 2                /* a quarter of what it keeps is unsure: it fades in unlike times */
-#define CROSS_SHIFT 2                     /* all but a quarter of the strongest memory counts for all; strips, ZERO.md */
-#define FRESH_ms ((uint32_t)SECONDS(2))   /* after a contact: a remainder may rise */
-#define REMAINDER_ms MS(700)              /* time constant of a remainder; strips: 0.5 s at least */
-#define REMAINDER_DOWN_ms MS(100)         /* the same when a force goes at last */
-#define KEEP_SHIFT 8                      /* 1/256 of the memory in a second: the level takes over the remainder, */
-#define CREEP_SHIFT 10                    /* 1/1024: what the remainder does not follow, */
-#define DRIFTED_SHIFT 3                   /* and an eighth of what may have drifted */
-#define DRIFT_SHIFT 2                     /* 0.24 Pa/s: drift of a contact; strips: 0.22 Pa/s */
-#define DRIFT_MAX_Pa 900                  /* of that in an hour */
-#define DRIFTED_ms SECONDS(8)             /* time constant with which it fades after the contact; choice */
+#define MEMORY_ms SECONDS(20)  /* time constant of the memory */
+#define SATURATED_Pa 100000    /* counts for a press beyond the range of a sensor */
+#define BESIDE_SHIFT 7         /* 0.8 kPa: what the sensor beside it measures at least, at a width of a third of the pitch */
+#define BAND_SHIFT 3           /* an eighth of the memory may remain; ZERO.md: a sixteenth and a quarter fail */
+#define DIP_SHIFT 2            /* a quarter may be missing */
+#define REOPEN_SHIFT 4         /* a sixteenth: what a sudden press must exceed after FRESH_ms */
+#define HOLD_ms SECONDS(3)     /* time constant of a hold's own part; strips: 1 to 4 s */
+#define RELEASED_ms SECONDS(2) /* of what is released, and so of what is retained; strips: the middle of 1 to 4 s */
+#define HYSTERESIS_SD 1311     /* 2 % is the sd until releases show it; the twin's after-effect: 2.3 % rms */
+#define HYSTERESIS_MIN 328     /* 0.5 %: releases may hide it (pads 21 to 24, gains alone) */
+#define HYSTERESIS_MAX 16384   /* a quarter; range */
+#define HYSTERESIS_FORCE 3277  /* a twentieth: twice the sd that it shows is the band of all, an eighth */
+#define HYSTERESIS_SHOWS_ms ((uint32_t)MS(200)) /* after a contact; the remainder follows in 100 ms */
+#define HYSTERESIS_LEAST_Pa 1000                /* less shows nothing beside noise and drift */
+#define HYSTERESIS_HIDES_Pa 32                  /* of more the zero has too much for a sensor to rest there; choice */
+#define LEARN_SHIFT 2                           /* a quarter of what each release shows; choice */
+#define RETAINED_LEARNT_MOST 16                 /* releases in the mean of what a sensor retains; twin, seeds 101 to 104 */
+#define UNSURE_SHIFT 2                          /* a quarter of what it retains is unsure: it fades in unlike times */
+#define CROSS_SHIFT 2                           /* all but a quarter of the strongest memory counts for all; strips, ZERO.md */
+#define FRESH_ms ((uint32_t)SECONDS(2))         /* after a contact: a remainder may rise */
+#define REMAINDER_ms MS(700)                    /* time constant of a remainder; strips: 0.5 s at least */
+#define REMAINDER_DOWN_ms MS(100)               /* the same when a force goes at last */
+#define KEEP_SHIFT 8                            /* 1/256 of the memory in a second: the level takes over the remainder, */
+#define CREEP_SHIFT 10                          /* 1/1024: what the remainder does not follow, */
+#define DRIFTED_SHIFT 3                         /* and an eighth of what may have drifted */
+#define DRIFT_SHIFT 2                           /* 0.24 Pa/s: drift of a contact; strips: 0.22 Pa/s */
+#define DRIFT_MAX_Pa 900                        /* of that in an hour */
+#define DRIFTED_ms SECONDS(8)                   /* time constant with which it fades after the contact; choice */
 
 /* Doubt: a force and a zero that has moved look alike. */
 #define WANDER_ms SECONDS(120) /* without evidence a doubt fades in minutes; choice */

@@ -29,32 +29,33 @@ struct band {
 
 static int32_t faded(int32_t value, int32_t share) { return value - part_of(value, share); }
 
-#ifdef FT_WITHOUT_PAST
-static int32_t kept_of(const struct condition_sensor *sensor) { return (void)sensor, 0; }
+#ifdef FT_WITHOUT_HYSTERESIS
+static int32_t retained_of(const struct condition_sensor *sensor) { return (void)sensor, 0; }
 static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q10) {
   (void)sensor;
   return of_Pa_q10 >> BAND_SHIFT;
 }
-static void follow_past(const struct step *step) { (void)step; }
-static void forget_past(struct condition_sensor *sensor) { (void)sensor; }
+static void follow_hysteresis(const struct step *step) { (void)step; }
+static void forget_hysteresis(struct condition_sensor *sensor) { (void)sensor; }
 static void follow_rest(const struct step *step) { step->sensor->rests_Pa_q10 = step->sensor->level_Pa_q10; }
 #else
 /* By how much a sensor reads above where it rests and its pressure. */
-static int32_t kept_of(const struct condition_sensor *sensor) { return (sensor->let_go_Pa_q10 >> 10) * sensor->keeps_share >> 6; }
+static int32_t retained_of(const struct condition_sensor *sensor) { return (sensor->released_Pa_q10 >> 10) * sensor->retained_q16 >> 6; }
 
 /* Of a press: an eighth, or twice what this sensor has kept of others. */
 static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q10) {
-  return larger(of_Pa_q10 >> BAND_SHIFT, part_of(of_Pa_q10, 2 * sensor->past_share));
+  return larger(of_Pa_q10 >> BAND_SHIFT, part_of(of_Pa_q10, 2 * sensor->hysteresis_q16));
 }
 
-static void follow_past(const struct step *step) {
+static void follow_hysteresis(const struct step *step) {
   struct condition_sensor *sensor = step->sensor;
   const int32_t held = step->condition->gate.pressed ? clamp(step->steady_Pa_q10, 0, Pa_q10(SATURATED_Pa)) : 0;
-  sensor->past_Pa_q10 += part_of(held - sensor->past_Pa_q10, share_in(step->ms, PAST_ms));
-  const int32_t let_go = faded(sensor->let_go_Pa_q10, share_in(step->ms, LET_GO_ms)) + step->fell_Pa_q10;
-  sensor->let_go_Pa_q10 = clamp(let_go, 0, Pa_q10(SATURATED_Pa));
-  const int32_t unsure = larger(PAST_SHARE_LEAST, size_of(sensor->keeps_share) >> KEEPS_SURE_SHIFT) + (PAST_SHARE >> sensor->learnt);
-  step->condition->past_sd_Pa_q10[step->k] = part_of(sensor->past_Pa_q10, sensor->past_share) + part_of(sensor->let_go_Pa_q10, unsure);
+  sensor->held_Pa_q10 += part_of(held - sensor->held_Pa_q10, share_in(step->ms, HOLD_ms));
+  const int32_t released = faded(sensor->released_Pa_q10, share_in(step->ms, RELEASED_ms)) + step->fell_Pa_q10;
+  sensor->released_Pa_q10 = clamp(released, 0, Pa_q10(SATURATED_Pa));
+  const int32_t unsure = larger(HYSTERESIS_MIN, size_of(sensor->retained_q16) >> UNSURE_SHIFT) + (HYSTERESIS_SD >> sensor->learnt);
+  step->condition->hysteresis_sd_Pa_q10[step->k] =
+      part_of(sensor->held_Pa_q10, sensor->hysteresis_q16) + part_of(sensor->released_Pa_q10, unsure);
 }
 
 /* What five and more sensors all keep is a force that is left: rubber keeps unlike shares. Of fewer it may be either. */
@@ -62,9 +63,9 @@ static bool is_left_by_force(const struct condition *condition, sensor_map usabl
   int pressed = 0;
   for (uint8_t k = 0; usable != 0; k++, usable >>= 1) {
     const struct condition_sensor *sensor = &condition->sensor[k];
-    if (usable & 1u && sensor->let_go_Pa_q10 > Pa_q10(PAST_LEAST_Pa)) {
+    if (usable & 1u && sensor->released_Pa_q10 > Pa_q10(HYSTERESIS_LEAST_Pa)) {
       const int32_t off = clamped_difference(sensor->before_Pa_q10, sensor->level_Pa_q10);
-      if (off <= part_of(sensor->let_go_Pa_q10, PAST_SHARE_FORCE)) {
+      if (off <= part_of(sensor->released_Pa_q10, HYSTERESIS_FORCE)) {
         return false;
       }
       pressed++;
@@ -74,16 +75,17 @@ static bool is_left_by_force(const struct condition *condition, sensor_map usabl
 }
 
 /* What is left after a contact shows how much this sensor's rubber keeps. 1.25 times the mean size is the sd of a hold's own part. */
-static void learn_past(const struct step *step, int32_t keeps_Pa_q10) {
+static void learn_hysteresis(const struct step *step, int32_t retained_Pa_q10) {
   struct condition_sensor *sensor = step->sensor;
   step->condition->to_learn &= ~sensor_bit(step->k);
-  const bool shows = sensor->let_go_Pa_q10 > Pa_q10(PAST_LEAST_Pa) && step->condition->gate.released_ms < FRESH_ms;
+  const bool shows = sensor->released_Pa_q10 > Pa_q10(HYSTERESIS_LEAST_Pa) && step->condition->gate.released_ms < FRESH_ms;
   if (shows && !is_left_by_force(step->condition, step->usable)) {
-    const int32_t most = part_of(sensor->let_go_Pa_q10, PAST_SHARE_MOST), let_go = sensor->let_go_Pa_q10 >> 16;
-    const int32_t off = clamp(size_of(keeps_Pa_q10) - step->condition->drifted_Pa_q10, 0, most), shown = port_divide(off + off / 4, let_go);
-    sensor->past_share = larger(sensor->past_share + ((shown - sensor->past_share) >> PAST_LEARN_SHIFT), PAST_SHARE_LEAST);
-    sensor->learnt += sensor->learnt < KEEPS_LEARNT_MOST;
-    sensor->keeps_share += port_divide(port_divide(clamp(keeps_Pa_q10, -most, most), let_go) - sensor->keeps_share, sensor->learnt);
+    const int32_t most = part_of(sensor->released_Pa_q10, HYSTERESIS_MAX), released = sensor->released_Pa_q10 >> 16;
+    const int32_t off = clamp(size_of(retained_Pa_q10) - step->condition->drifted_Pa_q10, 0, most),
+                  shown = port_divide(off + off / 4, released);
+    sensor->hysteresis_q16 = larger(sensor->hysteresis_q16 + ((shown - sensor->hysteresis_q16) >> LEARN_SHIFT), HYSTERESIS_MIN);
+    sensor->learnt += sensor->learnt < RETAINED_LEARNT_MOST;
+    sensor->retained_q16 += port_divide(port_divide(clamp(retained_Pa_q10, -most, most), released) - sensor->retained_q16, sensor->learnt);
   }
 }
 
@@ -91,21 +93,21 @@ static void learn_past(const struct step *step, int32_t keeps_Pa_q10) {
  * zero once little is past. */
 static void follow_rest(const struct step *step) {
   struct condition_sensor *sensor = step->sensor;
-  const int32_t zero = step->condition->zero_Pa_q10[step->k], keeps = step->above_Pa_q10 + zero - sensor->rests_Pa_q10;
-  if (step->condition->gate.released_ms >= PAST_SHOWS_ms) {
+  const int32_t zero = step->condition->zero_Pa_q10[step->k], retained = step->above_Pa_q10 + zero - sensor->rests_Pa_q10;
+  if (step->condition->gate.released_ms >= HYSTERESIS_SHOWS_ms) {
     if (step->condition->to_learn >> step->k & 1u) {
-      learn_past(step, keeps);
+      learn_hysteresis(step, retained);
     }
-    const int32_t off = keeps - kept_of(sensor);
-    const int32_t most = step->ms >> SLEW_SHIFT, past = sensor->let_go_Pa_q10 / Pa_q10(PAST_HIDES_Pa);
+    const int32_t off = retained - retained_of(sensor);
+    const int32_t most = step->ms >> SLEW_SHIFT, hidden = sensor->released_Pa_q10 / Pa_q10(HYSTERESIS_HIDES_Pa);
     sensor->rests_Pa_q10 += clamp(part_of(off, share_in(step->ms, FOLLOW_ms)), -most, most);
-    sensor->rests_Pa_q10 += port_divide(zero - sensor->rests_Pa_q10, 1 + past * past);
+    sensor->rests_Pa_q10 += port_divide(zero - sensor->rests_Pa_q10, 1 + hidden * hidden);
   }
 }
 
-static void forget_past(struct condition_sensor *sensor) {
-  sensor->past_Pa_q10 = 0;
-  sensor->past_share = larger(sensor->past_share, PAST_SHARE);
+static void forget_hysteresis(struct condition_sensor *sensor) {
+  sensor->held_Pa_q10 = 0;
+  sensor->hysteresis_q16 = larger(sensor->hysteresis_q16, HYSTERESIS_SD);
 }
 #endif
 
@@ -125,9 +127,9 @@ void update_begin_tare(struct condition *condition, uint8_t k, int32_t spread_Pa
   sensor->tare_begun_ms = condition->now_ms;
   sensor->tare_left = ZERO_TARE_FRAMES;
   sensor->memory_Pa_q10 = sensor->reached_Pa_q10 = 0;
-  forget_past(sensor);
+  forget_hysteresis(sensor);
   sensor->wander_Pa_q10 = sensor->taken_Pa_q10 = sensor->crept_Pa_q10 = 0;
-  condition->faded_Pa_q10[k] = condition->margin_Pa_q10[k] = sensor->kept_Pa_q10 = sensor->let_go_Pa_q10 = 0;
+  condition->faded_Pa_q10[k] = condition->margin_Pa_q10[k] = sensor->retained_Pa_q10 = sensor->released_Pa_q10 = 0;
   condition->sum_Pa_q10[k] = 0;
   condition->summed[k] = 0;
   condition->taring |= sensor_bit(k);
@@ -178,7 +180,7 @@ static void remember(const struct step *step, int32_t rise_Pa_q10) {
   sensor->memory_Pa_q10 = memory;
   condition->memory_Pa_q10 = larger(condition->memory_Pa_q10, memory - (memory >> CROSS_SHIFT));
 
-  follow_past(step);
+  follow_hysteresis(step);
   const int32_t crept = pressed ? sensor->crept_Pa_q10 : faded(sensor->crept_Pa_q10, step->wander_share);
   const int32_t most = step->ms << CREEPING_SHIFT;
   sensor->crept_Pa_q10 = clamp(crept + clamp(rise_Pa_q10, -most, most), 0, Pa_q10(CREPT_MAX_Pa));
@@ -206,9 +208,9 @@ static void hold(const struct step *step) {
   }
   const int32_t remainder = condition->zero_Pa_q10[step->k] - sensor->rests_Pa_q10;
   int32_t *off = &condition->faded_Pa_q10[step->k];
-  const int32_t gone = *off + sensor->kept_Pa_q10;
-  sensor->kept_Pa_q10 = kept_of(sensor);
-  *off = gone + part_of(remainder - gone, share_in(step->ms, LET_GO_ms)) - sensor->kept_Pa_q10;
+  const int32_t gone = *off + sensor->retained_Pa_q10;
+  sensor->retained_Pa_q10 = retained_of(sensor);
+  *off = gone + part_of(remainder - gone, share_in(step->ms, RELEASED_ms)) - sensor->retained_Pa_q10;
   condition->margin_Pa_q10[step->k] += *off;
 }
 
@@ -324,7 +326,7 @@ static void follow(const struct step *step) {
   struct condition_sensor *sensor = step->sensor;
   const bool unsure = condition->unsure;
   condition->faded_Pa_q10[step->k] = 0;
-  sensor->kept_Pa_q10 = kept_of(sensor);
+  sensor->retained_Pa_q10 = retained_of(sensor);
   if (!unsure && settle(step)) {
     return;
   }

@@ -19,10 +19,10 @@
  * (host_tools/report/real). Such a reading counts as zero from this number of noise sd below it. A tangential force makes readings negative
  * too, so where a pad's profile is in use they stay as they are. The paper's scene keeps the paper's fit. */
 #ifdef FINGERTIP_SCENE_PAPER
-#define DEFAULT_CUT_NOISES 0u
+#define DEFAULT_CLIP_BELOW_SDS 0u
 #define DEFAULT_USES_SHAPE 0
 #else
-#define DEFAULT_CUT_NOISES 4u
+#define DEFAULT_CLIP_BELOW_SDS 4u
 #define DEFAULT_USES_SHAPE 1 /* that a calibration found */
 #endif
 

@@ -44,21 +44,21 @@ void fit_gaussian_grid_update(const struct fit_array *array, const int32_t *pres
     outliers->usable = usable;
     outliers->frames = 0;
   }
-  const sensor_map left_out = outliers->frames > 0 ? outliers->left_out : 0;
-  const bool rough = fit_rectangle(array, pressure_Pa_q10, usable & ~left_out, settings, result);
+  const sensor_map outlier = outliers->frames > 0 ? outliers->outlier : 0;
+  const bool rough = fit_rectangle(array, pressure_Pa_q10, usable & ~outlier, settings, result);
   if (outliers->frames > 0) {
     outliers->frames--;
     if (!rough || !has_grown(outliers, result)) {
       return;
     }
-    if (left_out) { /* the next frame takes all sensors */
+    if (outlier) { /* the next frame takes all sensors */
       outliers->frames = 0;
       return;
     }
   }
   if (rough) {
     leave_outlier_out(array, pressure_Pa_q10, usable, settings, &outliers->refit, result);
-    outliers->left_out = usable & ~result->used;
+    outliers->outlier = usable & ~result->used;
     outliers->frames = FIT_OUTLIER_FRAMES;
     outliers->residual_rms_Pa = result->residual_rms_Pa;
     outliers->force_N = result->force_N;

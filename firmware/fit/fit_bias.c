@@ -65,7 +65,7 @@ FIXED_INLINE int32_t offset_in_sigmas(float at, int32_t from_q16, int32_t per_si
   return fixed_clamp(fixed_mul_16(off_q16, per_sigma_q12), -OFFSET_MAX_Q12 + 1, OFFSET_MAX_Q12 - 1);
 }
 
-/* What a row holds at first: location of the sensor from the contact, reading over p0, error by gain and past, deviations (fit_types.h). */
+/* What a row holds at first: location of the sensor from the contact, reading over p0, error by gain and hysteresis, deviations. */
 enum { AT_X_Q12, AT_Y_Q12, READING_Q18, ERROR_Q4, OFF_X_Q12, OFF_Y_Q12, WIDER_Q15 };
 
 /* False: there is nothing to be seen in so few or such readings. */
@@ -105,8 +105,8 @@ static bool prepare_rows(const struct fit_array *array, const int32_t *pressure_
     (*row)[AT_Y_Q12] = offset_in_sigmas(array->y[k], y_q16, per_sigma_q12);
     (*row)[READING_Q18] = shifted(reading * per_p0.mantissa, per_p0.exponent + shift - 10 + 18);
     int32_t gain_q4 = (int32_t)(((uint32_t)settings->gain_sd_q16[k] * fixed_magnitude(reading)) >> 12);
-    int32_t past_q4 = fixed_clamp(shifted(settings->past_sd_Pa_q10[k], 4 - shift), 0, ERROR_MAX_Q4);
-    (*row)[ERROR_Q4] = fixed_hypot(gain_q4, past_q4);
+    int32_t hysteresis_q4 = fixed_clamp(shifted(settings->hysteresis_sd_Pa_q10[k], 4 - shift), 0, ERROR_MAX_Q4);
+    (*row)[ERROR_Q4] = fixed_hypot(gain_q4, hysteresis_q4);
     (*row)[OFF_X_Q12] = (*row)[OFF_Y_Q12] = (*row)[WIDER_Q15] = 0;
     if (settings->deviations) {
       const struct fit_deviation *deviation = &settings->deviations[k];
@@ -247,8 +247,8 @@ void fit_bias_begin(struct fit_bias *bias) {
   bias->part = 0;
 }
 
-void fit_bias_widen(const struct fit_bias *bias, const struct fit_array *array, const struct fit_settings *settings,
-                    struct fit_result *result) {
+void fit_bias_add(const struct fit_bias *bias, const struct fit_array *array, const struct fit_settings *settings,
+                  struct fit_result *result) {
   if (!is_located(result) || (bias->known && bias->ratio == 0.0f)) {
     return;
   }

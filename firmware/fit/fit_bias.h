@@ -53,10 +53,10 @@ void fit_bias_begin(struct fit_bias *bias);
 
 /* Adds the bias to location_sd_mm, and sets UNCERTAIN above the limit. It leaves alone a result that is no fit, stopped at a limit, or is
  * FLAT. */
-void fit_bias_widen(const struct fit_bias *bias, const struct fit_array *array, const struct fit_settings *settings,
-                    struct fit_result *result);
+void fit_bias_add(const struct fit_bias *bias, const struct fit_array *array, const struct fit_settings *settings,
+                  struct fit_result *result);
 
-/* Does the next part of a search. The first part takes the readings, which are those of the result. A result that fit_bias_widen leaves
+/* Does the next part of a search. The first part takes the readings, which are those of the result. A result that fit_bias_add leaves
  * alone begins no search. */
 void fit_bias_step(struct fit_bias *bias, const struct fit_array *array, const int32_t *pressure_Pa_q10,
                    const struct fit_settings *settings, const struct fit_result *result);

@@ -13,14 +13,14 @@
 
 /* Readings below this share of the largest, or this number of noise standard deviations, have more noise than shape in their logarithm. */
 #define GUESS_SHARE 0.01f
-#define GUESS_NOISES 5.0f
+#define GUESS_NOISE_SDS 5.0f
 /* Prior of the guess alone, which decides where too few readings are large. */
 #define GUESS_PRIOR_WEIGHT 3e-3f
 #define GUESS_PRIOR_SIGMA 0.42f
 
 /* Longest step, pitches and share of sigma. A longer one is shortened as a whole (NUMERICS.md, "Step"). */
-#define MOVE_LIMIT 0.65f
-#define WIDEN_LIMIT 0.5f
+#define STEP_MAX 0.65f
+#define WIDTH_STEP_MAX 0.5f
 /* Pitches by which an iterate may leave the box that the result is held to, for the same reason. */
 #define OVERSHOOT 0.25f
 #define P0_MIN 0.05f       /* of the largest reading */
@@ -235,9 +235,9 @@ static float step(const struct fit_array *array, struct normal_equations *normal
   float dx = gain * normal->rhs[1];
   float dy = gain * normal->rhs[2];
   float ratio = gain * normal->rhs[3]; /* of the change of sigma to sigma */
-  float excess = fabsf(ratio) * (1.0f / WIDEN_LIMIT);
-  excess = fabsf(dx) * (1.0f / MOVE_LIMIT) > excess ? fabsf(dx) * (1.0f / MOVE_LIMIT) : excess;
-  excess = fabsf(dy) * (1.0f / MOVE_LIMIT) > excess ? fabsf(dy) * (1.0f / MOVE_LIMIT) : excess;
+  float excess = fabsf(ratio) * (1.0f / WIDTH_STEP_MAX);
+  excess = fabsf(dx) * (1.0f / STEP_MAX) > excess ? fabsf(dx) * (1.0f / STEP_MAX) : excess;
+  excess = fabsf(dy) * (1.0f / STEP_MAX) > excess ? fabsf(dy) * (1.0f / STEP_MAX) : excess;
   float share = excess > 1.0f ? 1.0f / excess : 1.0f;
   dx *= share;
   dy *= share;
@@ -351,9 +351,9 @@ static void add_sensor_errors(const struct samples *samples, const struct fit_se
     float by_x = product(row, influence->x), by_y = product(row, influence->y);
     float by_force = product(row, influence->force);
     float gain_sd = (float)settings->gain_sd_q16[samples->sensor[k]] * (1.0f / 65536.0f);
-    float past_sd = scale * (float)settings->past_sd_Pa_q10[samples->sensor[k]];
+    float hysteresis_sd = scale * (float)settings->hysteresis_sd_Pa_q10[samples->sensor[k]];
     float error = at->p0 * (gain_sd * e + FIT_DIP_ERROR * d);
-    float variance = error * error + past_sd * past_sd;
+    float variance = error * error + hysteresis_sd * hysteresis_sd;
     errors->gains += variance;
     errors->location += (by_x * by_x + by_y * by_y) * variance;
     errors->force += by_force * by_force * variance;
@@ -413,7 +413,7 @@ static void take_samples(const int32_t *pressure_Pa_q10, sensor_map usable, stru
   const struct fit_array *array = problem->array;
   const struct fit_settings *settings = problem->settings;
   const float scale = problem->scale;
-  float guess_share = GUESS_NOISES * (float)settings->noise_Pa_q10 * scale;
+  float guess_share = GUESS_NOISE_SDS * (float)settings->noise_Pa_q10 * scale;
   guess_share = clamp(guess_share, GUESS_SHARE, 0.99f); /* the largest reading enters */
   const bool has_dip = fit_has_dip(settings);
   struct samples *samples = &problem->samples;

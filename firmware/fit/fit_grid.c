@@ -25,18 +25,18 @@
 
 /* First guess: smaller readings have more noise than shape in their logarithm; a ridge towards sigma 0.45 pitch decides where few remain.
  */
-#define GUESS_SHARE_Q30 85899346                         /* 8 % of the largest marginal */
-#define GUESS_RIDGE ((struct scaled){25166, -23})        /* 0.003 */
-#define GUESS_RIDGE_HEIGHT ((struct scaled){22410, -21}) /* 0.003 * log2(e) / (2 * 0.45^2) */
-#define GUESS_HEIGHT_MIN_Q26 1936353
-#define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
+#define GUESS_SHARE_Q30 85899346                            /* 8 % of the largest marginal */
+#define GUESS_RIDGE ((struct scaled){25166, -23})           /* 0.003 */
+#define GUESS_RIDGE_CURVATURE ((struct scaled){22410, -21}) /* 0.003 * log2(e) / (2 * 0.45^2) */
+#define GUESS_CURVATURE_MIN_Q26 1936353
+#define GUESS_CURVATURE_MAX_Q26 484088133 /* sigma 0.316 pitch */
 
 /* FIT_ELONGATION_ MIN^2, SDS^2, SD_MAX^2 and LINEAR^2, and the curvature of FIT_WIDTHS_SIGMA_MIN. */
-#define ROUND_SQUARE ((struct scaled){20972, -21})
-#define SURE_SQUARE ((struct scaled){25600, -12})
-#define KNOWN_SQUARE ((struct scaled){16384, -18})
-#define LINEAR_SQUARE ((struct scaled){16056, -15})
-#define SHAPE_HEIGHT_MAX_Q26 160029133
+#define ELONGATION_MIN_SQUARE ((struct scaled){20972, -21})
+#define ELONGATION_SDS_SQUARE ((struct scaled){25600, -12})
+#define ELONGATION_SD_MAX_SQUARE ((struct scaled){16384, -18})
+#define ELONGATION_LINEAR_SQUARE ((struct scaled){16056, -15})
+#define ELONGATION_CURVATURE_MAX_Q26 160029133
 #define TAIL_ERROR ((struct scaled){31457, -21}) /* FIT_TAIL_ERROR */
 
 /* One factor of the Gaussian, and the polynomials orthogonal under its square: p1 = k - mean, p2 = k^2 - k slope + constant, k the node. */
@@ -254,18 +254,18 @@ static NOINLINE void finish(const struct readings *readings, const struct moment
 }
 
 /* How far the contact is from round. Widths that differ, e p2(x) and e q2(y) with signs of their
- * own, and a slant, e p1(x) q1(y), are two more orthogonal columns. Their coefficients are
- *   stretch = log(sigma_x / sigma_y)  and  slant,
- * the same for a contact turned by 45 degrees; together they are the logarithm of the longer width over the shorter. */
-struct shape {
-  struct scaled wider_x, wider_y, stretch, slant; /* wider: log of sigma_x / sigma, sigma_y / sigma */
-  struct scaled noise_form;                       /* by which the readings' variance gives that of (length of both)^2 / 2 */
-  int32_t x, y, xy, exponent;                     /* how one unit of each column moves that square, halved */
-  uint32_t by_gains;                              /* sum over the sensors, as in struct fit_propagation */
+ * own, and e p1(x) q1(y) are two more orthogonal columns. Their coefficients are the elongation along the axes,
+ *   axial = log(sigma_x / sigma_y),  and  diagonal,
+ * the same of a contact turned by 45 degrees; together they are the logarithm of the longer width over the shorter. */
+struct elongation {
+  struct scaled log_width_x, log_width_y, axial, diagonal; /* log_width: log of sigma_x / sigma, sigma_y / sigma */
+  struct scaled noise_form;                                /* by which the readings' variance gives that of (length of both)^2 / 2 */
+  int32_t x, y, xy, exponent;                              /* how one unit of each column changes that square, halved */
+  uint32_t by_gains;                                       /* sum over the sensors, as in struct fit_propagation */
 };
 
 /* The sum of the residual against e p1(x) q1(y). */
-static struct scaled project_slant(const struct moments *m, const struct readings *readings, int32_t residual_shift) {
+static struct scaled project_diagonal(const struct moments *m, const struct readings *readings, int32_t residual_shift) {
   const int32_t *r = readings->residual;
   int32_t sum = 0;
   for (int i = 0; i < COLUMNS; i++) {
@@ -277,8 +277,8 @@ static struct scaled project_slant(const struct moments *m, const struct reading
   return fit_scaled_from(sum, 17 + residual_shift - 28 - m->x.linear_q - m->y.linear_q);
 }
 
-static NOINLINE void begin_shape(const struct readings *readings, const struct moments *m, const struct fit_equations *equations,
-                                 const struct fit_propagation *propagation, struct shape *shape) {
+static NOINLINE void begin_elongation(const struct readings *readings, const struct moments *m, const struct fit_equations *equations,
+                                      const struct fit_propagation *propagation, struct elongation *elongation) {
   const struct factor *x = &m->x, *y = &m->y;
   struct scaled mass_x = fit_scaled_from(x->mass_q26, -26), mass_y = fit_scaled_from(y->mass_q26, -26);
   int32_t norm_q = 3 - 2 * m->square_q;
@@ -291,23 +291,24 @@ static NOINLINE void begin_shape(const struct readings *readings, const struct m
   struct scaled along_x = scaled_mul(inverse_x, inverse_stiffness);
   struct scaled along_y = scaled_mul(inverse_y, inverse_stiffness);
   struct scaled along_xy = scaled_mul(inverse_xy, inverse_stiffness);
-  shape->wider_x = scaled_mul(fit_scaled_from(m->b_x, q), along_x);
-  shape->wider_y = scaled_mul(fit_scaled_from(m->b_y, q), along_y);
-  shape->stretch = fit_scaled_short(scaled_sub(shape->wider_x, shape->wider_y));
-  shape->slant = scaled_mul(project_slant(m, readings, equations->residual_shift), along_xy);
+  elongation->log_width_x = scaled_mul(fit_scaled_from(m->b_x, q), along_x);
+  elongation->log_width_y = scaled_mul(fit_scaled_from(m->b_y, q), along_y);
+  elongation->axial = fit_scaled_short(scaled_sub(elongation->log_width_x, elongation->log_width_y));
+  elongation->diagonal = scaled_mul(project_diagonal(m, readings, equations->residual_shift), along_xy);
 
-  struct scaled values[3] = {scaled_mul(shape->stretch, along_x), scaled_mul(shape->stretch, along_y), scaled_mul(shape->slant, along_xy)};
-  shape->noise_form = scaled_add(scaled_add(scaled_mul(values[0], shape->stretch), scaled_mul(values[1], shape->stretch)),
-                                 scaled_mul(values[2], shape->slant));
-  shape->noise_form = scaled_mul(shape->noise_form, inverse_stiffness);
+  struct scaled values[3] = {scaled_mul(elongation->axial, along_x), scaled_mul(elongation->axial, along_y),
+                             scaled_mul(elongation->diagonal, along_xy)};
+  elongation->noise_form = scaled_add(scaled_add(scaled_mul(values[0], elongation->axial), scaled_mul(values[1], elongation->axial)),
+                                      scaled_mul(values[2], elongation->diagonal));
+  elongation->noise_form = scaled_mul(elongation->noise_form, inverse_stiffness);
   values[0].exponent -= m->square_q;
   values[1].exponent -= m->square_q;
   values[2].exponent -= x->linear_q + y->linear_q - 15;
   int32_t aligned[3];
-  shape->exponent = fit_grid_align(values, 3, aligned) + 15;
-  shape->x = aligned[0];
-  shape->y = -aligned[1];
-  shape->xy = aligned[2];
+  elongation->exponent = fit_grid_align(values, 3, aligned) + 15;
+  elongation->x = aligned[0];
+  elongation->y = -aligned[1];
+  elongation->xy = aligned[2];
 }
 
 /* cosh(v) and sinh(v) / v from v^2, Q13, for v^2 up to FIT_ELONGATION_MAX^2: error below 1 %. */
@@ -316,22 +317,22 @@ FIXED_INLINE int32_t sinh_ratio_q13(int32_t square_q13) {
   return 8192 + port_divide(square_q13, 6) + port_divide((square_q13 * square_q13) >> 13, 120);
 }
 
-/* Covariance = sigma^2 exp(wider_x + wider_y) exp([stretch slant; slant -stretch]). */
-static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *result) {
-  int32_t stretch = fit_scaled_to_fixed(shape->stretch, 13), slant = fit_scaled_to_fixed(shape->slant, 13);
-  int32_t wider = fit_scaled_to_fixed(scaled_add(shape->wider_x, shape->wider_y), 13);
+/* Covariance = sigma^2 exp(log_width_x + log_width_y) exp([axial diagonal; diagonal -axial]). */
+static NOINLINE bool set_widths(const struct elongation *elongation, struct fit_result *result) {
+  int32_t axial = fit_scaled_to_fixed(elongation->axial, 13), diagonal = fit_scaled_to_fixed(elongation->diagonal, 13);
+  int32_t log_width = fit_scaled_to_fixed(scaled_add(elongation->log_width_x, elongation->log_width_y), 13);
   const int32_t most = (int32_t)(FIT_ELONGATION_MAX * 8192.0f);
-  if (fixed_magnitude(stretch) > (uint32_t)most || fixed_magnitude(slant) > (uint32_t)most || fixed_magnitude(wider) > 8192) {
+  if (fixed_magnitude(axial) > (uint32_t)most || fixed_magnitude(diagonal) > (uint32_t)most || fixed_magnitude(log_width) > 8192) {
     return false;
   }
-  int32_t square = (stretch * stretch + slant * slant) >> 13;
+  int32_t square = (axial * axial + diagonal * diagonal) >> 13;
   if (square > (most * most) >> 13) {
     return false;
   }
   int32_t mean = cosh_q13(square), ratio = sinh_ratio_q13(square);
-  int32_t part = (ratio * stretch) >> 13, across = (ratio * slant) >> 13;
+  int32_t part = (ratio * axial) >> 13, across = (ratio * diagonal) >> 13;
   /* exp of half the sum, since it multiplies widths. */
-  int32_t half = wider >> 1, half_square = (half * half) >> 13;
+  int32_t half = log_width >> 1, half_square = (half * half) >> 13;
   int32_t growth = 8192 + half + (half_square >> 1) + port_divide((half_square * half) >> 13, 6);
   struct scaled scale = scaled_mul(fit_scaled_from(growth, -13), fit_grid_scaled(result->sigma_mm));
   struct scaled x = fit_scaled_sqrt(fit_scaled_from(mean + part, -13));
@@ -347,49 +348,50 @@ static NOINLINE bool set_widths(const struct shape *shape, struct fit_result *re
 }
 
 /* Each column has g of one axis, so a sensor's influence is a number of its column of nodes times gy, and one of its row times gx. */
-struct moves {
+struct influence {
   int32_t column[MAX_COLUMNS], row[MAX_ROWS];
 };
 
 /* The same as fit_grid_add_influence, from factors instead of the influence of each sensor. */
-static NOINLINE void add_influence(const struct moments *m, const struct moves *moves, const struct readings *work, uint32_t *by_gains,
-                                   int32_t *by_shape) {
+static NOINLINE void add_influence(const struct moments *m, const struct influence *influence, const struct readings *work,
+                                   uint32_t *by_gains, int32_t *by_shape) {
   const int32_t *errors = work->q14, *shapes = work->residual;
   uint32_t squares = *by_gains;
   int32_t sum = 0;
   for (int i = 0; i < COLUMNS; i++) {
     // cppcheck-suppress uninitvar ; the caller has set as many
-    int32_t column = moves->column[i], g = m->x.g_q14[i];
+    int32_t column = influence->column[i], g = m->x.g_q14[i];
     UNROLL for (int j = 0; j < ROWS; j++) {
-      int32_t move = (column * m->y.g_q14[j] + moves->row[j] * g) >> 15;
-      int32_t high = (move * *errors++) >> 16;
+      int32_t change = (column * m->y.g_q14[j] + influence->row[j] * g) >> 15;
+      int32_t high = (change * *errors++) >> 16;
       squares += (uint32_t)(high * high) >> PROPAGATION_SQUARE_SHIFT;
-      sum += (move * *shapes++) >> 4;
+      sum += (change * *shapes++) >> 4;
     }
   }
   *by_gains = squares;
   *by_shape = sum;
 }
 
-/* The same for the shape's two columns, of the gains alone. */
-static NOINLINE void add_shape_moves(const struct moments *m, const struct moves *moves, const struct readings *work, struct shape *shape) {
+/* The same for the two columns of the elongation, of the gains alone. */
+static NOINLINE void add_elongation_influence(const struct moments *m, const struct influence *influence, const struct readings *work,
+                                              struct elongation *elongation) {
   const int32_t *errors = work->q14;
   uint32_t squares = 0;
   for (int i = 0; i < COLUMNS; i++) {
-    int32_t column = moves->column[i], g = m->x.g_q14[i];
-    int32_t slant = (shape->xy * m->x.linear[i]) >> 15;
+    int32_t column = influence->column[i], g = m->x.g_q14[i];
+    int32_t xy = (elongation->xy * m->x.linear[i]) >> 15;
     UNROLL for (int j = 0; j < ROWS; j++) {
-      int32_t move = (column * m->y.g_q14[j] + moves->row[j] * g + slant * m->y.linear[j]) >> 15;
-      int32_t high = (move * *errors++) >> 16;
+      int32_t change = (column * m->y.g_q14[j] + influence->row[j] * g + xy * m->y.linear[j]) >> 15;
+      int32_t high = (change * *errors++) >> 16;
       squares += (uint32_t)(high * high) >> PROPAGATION_SQUARE_SHIFT;
     }
   }
-  shape->by_gains = squares;
+  elongation->by_gains = squares;
 }
 
 /* And of the profile's tail, which is off everywhere at once. */
-static NOINLINE void add_tail_moves(const struct moments *m, const struct moves *moves, const struct readings *readings,
-                                    const struct fit_equations *equations, int32_t gain_shift, struct shape *shape) {
+static NOINLINE void add_tail_influence(const struct moments *m, const struct influence *influence, const struct readings *readings,
+                                        const struct fit_equations *equations, int32_t gain_shift, struct elongation *elongation) {
   struct dip dip;
   const int32_t depth_q28 = fit_grid_dip(readings->dip_curvature, TAIL_ERROR, &equations->at, 1 << 28, equations->rise_q22,
                                          (int32_t)(FIT_DIP_DEPTH_MAX * 268435456.0f), &dip);
@@ -397,16 +399,16 @@ static NOINLINE void add_tail_moves(const struct moments *m, const struct moves 
   const int32_t error = fixed_clamp((depth_q28 >> 12) * (1 << (gain_shift + 1)) / 2, 0, INT16_MAX);
   int32_t sum = 0;
   for (int i = 0; i < COLUMNS; i++) {
-    int32_t column = moves->column[i], g = m->x.g_q14[i];
-    int32_t slant = (shape->xy * m->x.linear[i]) >> 15;
+    int32_t column = influence->column[i], g = m->x.g_q14[i];
+    int32_t xy = (elongation->xy * m->x.linear[i]) >> 15;
     int32_t along = (error * (dip.x[i] >> 15)) >> 15;
     UNROLL for (int j = 0; j < ROWS; j++) {
-      int32_t move = (column * m->y.g_q14[j] + moves->row[j] * g + slant * m->y.linear[j]) >> 15;
-      sum += (move * ((along * (dip.y[j] >> 15)) >> 15)) >> 4;
+      int32_t change = (column * m->y.g_q14[j] + influence->row[j] * g + xy * m->y.linear[j]) >> 15;
+      sum += (change * ((along * (dip.y[j] >> 15)) >> 15)) >> 4;
     }
   }
   const int32_t high = fixed_clamp(sum >> 12, -INT16_MAX, INT16_MAX);
-  shape->by_gains += (uint32_t)(high * high) >> PROPAGATION_SQUARE_SHIFT;
+  elongation->by_gains += (uint32_t)(high * high) >> PROPAGATION_SQUARE_SHIFT;
 }
 
 /* A coefficient times the linear and one times the square column of an axis. */
@@ -417,62 +419,62 @@ FIXED_INLINE void set_parts(const struct factor *f, int nodes, int32_t linear, i
 /* What errors of single sensors make of the result. */
 static NOINLINE void spread_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings, const struct moments *m,
                                    const struct fit_equations *equations, struct readings *work, struct fit_propagation *propagation,
-                                   struct shape *shape) {
+                                   struct elongation *elongation) {
   const struct factor *x = &m->x, *y = &m->y;
-  int32_t *moved = work->q28;
+  int32_t *model = work->q28;
   for (int i = 0; i < COLUMNS; i++) {
     int32_t g = x->g_q14[i];
-    UNROLL for (int j = 0; j < ROWS; j++) { *moved++ = (g * y->g_q14[j]) >> 13; }
+    UNROLL for (int j = 0; j < ROWS; j++) { *model++ = (g * y->g_q14[j]) >> 13; }
   }
   fit_grid_set_errors(grid, settings, &equations->at, work, propagation);
-  struct moves moves;
-  set_parts(x, COLUMNS, propagation->x1, propagation->x3, moves.column);
-  set_parts(y, ROWS, 0, propagation->x3, moves.row);
-  add_influence(m, &moves, work, &propagation->by_gains, &propagation->shape_x);
-  set_parts(x, COLUMNS, 0, propagation->y3, moves.column);
-  set_parts(y, ROWS, propagation->y2, propagation->y3, moves.row);
-  add_influence(m, &moves, work, &propagation->by_gains, &propagation->shape_y);
-  set_parts(x, COLUMNS, propagation->f1, propagation->f3, moves.column);
-  set_parts(y, ROWS, propagation->f2, propagation->f3, moves.row);
-  UNROLL for (int j = 0; j < ROWS; j++) { moves.row[j] += (propagation->f0 * y->g_q14[j]) >> 13; }
-  add_influence(m, &moves, work, &propagation->force_by_gains, &propagation->shape_force);
-  set_parts(x, COLUMNS, 0, shape->x * 2, moves.column);
-  set_parts(y, ROWS, 0, shape->y * 2, moves.row);
-  add_shape_moves(m, &moves, work, shape);
+  struct influence influence;
+  set_parts(x, COLUMNS, propagation->x1, propagation->x3, influence.column);
+  set_parts(y, ROWS, 0, propagation->x3, influence.row);
+  add_influence(m, &influence, work, &propagation->by_gains, &propagation->shape_x);
+  set_parts(x, COLUMNS, 0, propagation->y3, influence.column);
+  set_parts(y, ROWS, propagation->y2, propagation->y3, influence.row);
+  add_influence(m, &influence, work, &propagation->by_gains, &propagation->shape_y);
+  set_parts(x, COLUMNS, propagation->f1, propagation->f3, influence.column);
+  set_parts(y, ROWS, propagation->f2, propagation->f3, influence.row);
+  UNROLL for (int j = 0; j < ROWS; j++) { influence.row[j] += (propagation->f0 * y->g_q14[j]) >> 13; }
+  add_influence(m, &influence, work, &propagation->force_by_gains, &propagation->shape_force);
+  set_parts(x, COLUMNS, 0, elongation->x * 2, influence.column);
+  set_parts(y, ROWS, 0, elongation->y * 2, influence.row);
+  add_elongation_influence(m, &influence, work, elongation);
   if (work->dip_share.mantissa != 0) {
-    add_tail_moves(m, &moves, work, equations, propagation->gain_shift, shape);
+    add_tail_influence(m, &influence, work, equations, propagation->gain_shift, elongation);
   }
   fit_grid_end_propagation(settings, equations, propagation);
 }
 
-/* The flags of the shape that apply. If it is elongated, separate widths would move the location. */
-static NOINLINE uint32_t judge_shape(const struct readings *readings, const struct fit_settings *settings,
-                                     const struct fit_equations *equations, const struct shape *shape,
-                                     struct fit_propagation *propagation) {
+/* The flags of the elongation that apply. If the contact is elongated, separate widths would move the location. */
+static NOINLINE uint32_t judge_elongation(const struct readings *readings, const struct fit_settings *settings,
+                                          const struct fit_equations *equations, const struct elongation *elongation,
+                                          struct fit_propagation *propagation) {
   const struct state *at = &equations->at;
-  if (at->curvature > SHAPE_HEIGHT_MAX_Q26) {
+  if (at->curvature > ELONGATION_CURVATURE_MAX_Q26) {
     return 0;
   }
-  struct scaled length_square =
-      fit_scaled_short(scaled_add(scaled_mul(shape->stretch, shape->stretch), scaled_mul(shape->slant, shape->slant)));
+  struct scaled length_square = fit_scaled_short(
+      scaled_add(scaled_mul(elongation->axial, elongation->axial), scaled_mul(elongation->diagonal, elongation->diagonal)));
   struct scaled noise = fit_scaled_from(settings->noise_Pa_q10, readings->shift - 28);
-  struct scaled by_gains =
-      scaled_mul(fit_scaled_from((int32_t)shape->by_gains, PROPAGATION_SQUARE_SHIFT - 2 * propagation->gain_shift + 2 * shape->exponent),
-                 scaled_mul(propagation->amplitude, propagation->amplitude));
-  struct scaled variance = fit_scaled_short(scaled_add(scaled_mul(scaled_mul(noise, noise), shape->noise_form), by_gains));
-  struct scaled least = scaled_add(scaled_mul(length_square, ROUND_SQUARE), scaled_mul(variance, SURE_SQUARE));
+  struct scaled by_gains = scaled_mul(
+      fit_scaled_from((int32_t)elongation->by_gains, PROPAGATION_SQUARE_SHIFT - 2 * propagation->gain_shift + 2 * elongation->exponent),
+      scaled_mul(propagation->amplitude, propagation->amplitude));
+  struct scaled variance = fit_scaled_short(scaled_add(scaled_mul(scaled_mul(noise, noise), elongation->noise_form), by_gains));
+  struct scaled least = scaled_add(scaled_mul(length_square, ELONGATION_MIN_SQUARE), scaled_mul(variance, ELONGATION_SDS_SQUARE));
   uint32_t flags = 0;
   if (scaled_sub(scaled_mul(length_square, length_square), least).mantissa > 0) {
     flags |= CONTACT_FLAG_ELONGATED;
-    struct scaled x = scaled_mul(fit_scaled_from(2 * at->x - equations->slope_x, -26), shape->wider_x);
-    struct scaled y = scaled_mul(fit_scaled_from(2 * at->y - equations->slope_y, -26), shape->wider_y);
+    struct scaled x = scaled_mul(fit_scaled_from(2 * at->x - equations->slope_x, -26), elongation->log_width_x);
+    struct scaled y = scaled_mul(fit_scaled_from(2 * at->y - equations->slope_y, -26), elongation->log_width_y);
     propagation->elongation_shift = scaled_add(scaled_mul(x, x), scaled_mul(y, y));
-    if (scaled_sub(length_square, LINEAR_SQUARE).mantissa > 0) {
-      struct scaled share = scaled_mul(LINEAR_SQUARE, fit_grid_reciprocal(length_square));
+    if (scaled_sub(length_square, ELONGATION_LINEAR_SQUARE).mantissa > 0) {
+      struct scaled share = scaled_mul(ELONGATION_LINEAR_SQUARE, fit_grid_reciprocal(length_square));
       propagation->elongation_shift = scaled_mul(propagation->elongation_shift, scaled_mul(share, share));
     }
   }
-  struct scaled known = scaled_mul(length_square, KNOWN_SQUARE);
+  struct scaled known = scaled_mul(length_square, ELONGATION_SD_MAX_SQUARE);
   if (scaled_sub(variance, known).mantissa <= 0) {
     flags |= CONTACT_FLAG_WIDTHS_VALID;
   }
@@ -545,8 +547,8 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   struct scaled b3 =
       scaled_from(product_of(m->x.square, weighted_x, COLUMNS) + product_of(m->y.square, weighted_y, ROWS), -14 - m->square_q);
   struct scaled norm = scaled_from(m->x.square_norm + m->y.square_norm, 3 - 2 * m->square_q);
-  struct scaled curvature = scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, b3), scaled_add(norm, GUESS_RIDGE));
-  state->curvature = fixed_clamp(scaled_to_fixed(curvature, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
+  struct scaled curvature = scaled_div(scaled_sub(GUESS_RIDGE_CURVATURE, b3), scaled_add(norm, GUESS_RIDGE));
+  state->curvature = fixed_clamp(scaled_to_fixed(curvature, 26), GUESS_CURVATURE_MIN_Q26, GUESS_CURVATURE_MAX_Q26);
   struct scaled half = scaled_div(scaled_from(1, -1), scaled_from(state->curvature, -26));
   int32_t x = (m->x.slope >> 1) + scaled_to_fixed(scaled_mul(c1, half), 26);
   int32_t y = (m->y.slope >> 1) + scaled_to_fixed(scaled_mul(c2, half), 26);
@@ -555,9 +557,9 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
 }
 
 /* Removes from the readings what is not the Gaussian's: the dip, and the deviations of the sensors. */
-static NOINLINE void take_out(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
-                              const struct state *state, const struct moments *m, const struct fit_equations *equations, int left,
-                              struct readings *readings) {
+static NOINLINE void remove_dip_and_deviations(const struct fit_array *array, const int32_t *pressure_Pa_q10,
+                                               const struct fit_settings *settings, const struct state *state, const struct moments *m,
+                                               const struct fit_equations *equations, int left, struct readings *readings) {
   const int32_t rise_q22 = fit_grid_rise(equations->at.curvature, m->x.offset, m->y.offset);
   if (readings->dip_share.mantissa != 0) {
     fit_grid_remove_dip(array, pressure_Pa_q10, state, equations->amplitude_q28, rise_q22, readings);
@@ -585,10 +587,10 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, con
   equations.cross = 0;
   int left = settings->iterations;
   int coarse = left - COARSE_ITERATIONS;
-  const int last = left > FIT_DEVIATION_ITERATIONS ? FIT_DEVIATION_ITERATIONS : 1; /* that takes out */
+  const int last = left > FIT_DEVIATION_ITERATIONS ? FIT_DEVIATION_ITERATIONS : 1; /* that removes */
   do {
     if (left < settings->iterations && left >= last && (readings.dip_share.mantissa != 0 || fit_has_deviations(settings))) {
-      take_out(array, pressure_Pa_q10, settings, &state, &m, &equations, left, &readings);
+      remove_dip_and_deviations(array, pressure_Pa_q10, settings, &state, &m, &equations, left, &readings);
     }
     equations.at = state;
     evaluate(&readings, left > coarse && left > FINE_ITERATIONS, &m, &equations);
@@ -603,15 +605,15 @@ bool fit_grid(const struct fit_array *array, const int32_t *pressure_Pa_q10, con
   result->sigma_x_mm = result->sigma_y_mm = result->width_correlation = 0.0f;
   finish(&readings, &m, &equations);
   struct fit_propagation propagation;
-  struct shape shape;
+  struct elongation elongation;
   const struct fit_columns_q q = {m.x.linear_q, m.y.linear_q, m.square_q - 1};
   fit_grid_begin_propagation(readings.shift, &equations, &q, &propagation);
-  begin_shape(&readings, &m, &equations, &propagation, &shape);
-  spread_errors(grid, settings, &m, &equations, &readings, &propagation, &shape);
-  uint32_t flags = judge_shape(&readings, settings, &equations, &shape, &propagation);
+  begin_elongation(&readings, &m, &equations, &propagation, &elongation);
+  spread_errors(grid, settings, &m, &equations, &readings, &propagation, &elongation);
+  uint32_t flags = judge_elongation(&readings, settings, &equations, &elongation, &propagation);
   bool rough = fit_grid_conclude(grid, &readings, settings, &equations, &propagation, &state, NODES, result);
   if (!(result->flags & (CONTACT_FLAG_AT_BOUND | CONTACT_FLAG_FLAT | CONTACT_FLAG_LOW_SIGNAL))) {
-    if ((flags & CONTACT_FLAG_WIDTHS_VALID) && !set_widths(&shape, result)) {
+    if ((flags & CONTACT_FLAG_WIDTHS_VALID) && !set_widths(&elongation, result)) {
       flags &= ~(uint32_t)CONTACT_FLAG_WIDTHS_VALID;
     }
     result->flags |= flags;

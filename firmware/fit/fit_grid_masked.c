@@ -77,11 +77,11 @@ struct ridge {
 /* Ridge of the guess: 0.003. Ridge of the iterations: 2^-31, below which columns are rounding. */
 static const struct ridge guess_ridge = {20, 206158430}; /* 0.003 * 2^36 */
 static const struct ridge rounding_ridge = {24, 1 << 13};
-#define GUESS_RIDGE_HEIGHT ((struct scaled){25733, -21}) /* 0.003 * log2(e) / (2 * 0.42^2) */
-#define GUESS_HEIGHT_MIN_Q26 1936353
-#define GUESS_HEIGHT_MAX_Q26 484088133 /* sigma 0.316 pitch */
-#define GUESS_NOISES 5                 /* readings below that many noise standard deviations, or */
-                                       /* 1 % of the largest, do not enter */
+#define GUESS_RIDGE_CURVATURE ((struct scaled){25733, -21}) /* 0.003 * log2(e) / (2 * 0.42^2) */
+#define GUESS_CURVATURE_MIN_Q26 1936353
+#define GUESS_CURVATURE_MAX_Q26 484088133 /* sigma 0.316 pitch */
+#define GUESS_NOISE_SDS 5                 /* readings below that many noise standard deviations, or */
+                                          /* 1 % of the largest, do not enter */
 
 enum { STEP = sizeof(struct node) / sizeof(int32_t) };
 
@@ -381,7 +381,7 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   int32_t noise = settings->noise_Pa_q10 >> down;
   noise = noise < largest >> up ? noise * (1 << up) : largest;
   int32_t least = (largest >> 7) + (largest >> 9);
-  least = noise * GUESS_NOISES > least ? noise * GUESS_NOISES : least;
+  least = noise * GUESS_NOISE_SDS > least ? noise * GUESS_NOISE_SDS : least;
   least = least < largest ? least : largest;
   int32_t weighted[MAX_NODES];
   for (int k = 0; k < NODES; k++) {
@@ -407,8 +407,8 @@ static NOINLINE void guess(const struct fit_grid_shape *grid, const struct readi
   eliminate(c, sum1, sum2, sum3, 14 - NORM_SHIFT, equations);
   struct scaled c1 = scaled_div(scaled_short(equations->b1), scaled_short(equations->d1));
   struct scaled c2 = scaled_div(scaled_short(equations->b2), scaled_short(equations->d2));
-  struct scaled curvature = scaled_div(scaled_sub(GUESS_RIDGE_HEIGHT, scaled_short(equations->b3)), scaled_short(equations->d3));
-  state->curvature = fixed_clamp(scaled_to_fixed(curvature, 26), GUESS_HEIGHT_MIN_Q26, GUESS_HEIGHT_MAX_Q26);
+  struct scaled curvature = scaled_div(scaled_sub(GUESS_RIDGE_CURVATURE, scaled_short(equations->b3)), scaled_short(equations->d3));
+  state->curvature = fixed_clamp(scaled_to_fixed(curvature, 26), GUESS_CURVATURE_MIN_Q26, GUESS_CURVATURE_MAX_Q26);
   struct scaled half = scaled_div((struct scaled){1 << 14, -15}, scaled_from(state->curvature, -26));
   c1 = scaled_sub(c1, scaled_mul(c2, scaled_from(equations->cross, -26)));
   int32_t x = scaled_to_fixed(scaled_mul(c1, half), 26);

@@ -94,8 +94,8 @@ int fit_grid_weigh(const struct fit_array *array, const struct fit_settings *set
     weight_q12[k] = 0;
     if (used >> sensor & 1) {
       int32_t gain = (int32_t)((uint32_t)settings->gain_sd_q16[sensor] * fixed_magnitude(readings->q14[k]) >> 8);
-      int32_t past = fixed_clamp(shifted(settings->past_sd_Pa_q10[sensor], readings->shift - 6), 0, 1 << 22);
-      int32_t error = fixed_hypot(of_one, fixed_hypot(gain, past));
+      int32_t hysteresis = fixed_clamp(shifted(settings->hysteresis_sd_Pa_q10[sensor], readings->shift - 6), 0, 1 << 22);
+      int32_t error = fixed_hypot(of_one, fixed_hypot(gain, hysteresis));
       int32_t weight = port_divide(of_one << 8, error >> 4);
       weight_q12[k] = weight;
       squares_q12 += (weight * weight) >> 12;

@@ -59,8 +59,8 @@ FIXED_INLINE void set_units(const struct fit_columns_q *columns, const struct fi
   units->of3.exponent -= columns->q3;
 }
 
-FIXED_INLINE void set_location_moves(const struct fit_equations *equations, const struct units *units,
-                                     struct fit_propagation *propagation) {
+FIXED_INLINE void set_location_influence(const struct fit_equations *equations, const struct units *units,
+                                         struct fit_propagation *propagation) {
   const struct state *at = &equations->at;
   struct scaled values[5];
   int32_t aligned[5];
@@ -81,7 +81,8 @@ FIXED_INLINE void set_location_moves(const struct fit_equations *equations, cons
 }
 
 /* dF / F = dp0 / p0 + 2 dsigma / sigma, each by its part in the basis. */
-FIXED_INLINE void set_force_moves(const struct fit_equations *equations, const struct units *units, struct fit_propagation *propagation) {
+FIXED_INLINE void set_force_influence(const struct fit_equations *equations, const struct units *units,
+                                      struct fit_propagation *propagation) {
   const struct state *at = &equations->at;
   struct scaled values[4];
   int32_t aligned[4];
@@ -102,28 +103,28 @@ FIXED_INLINE void set_force_moves(const struct fit_equations *equations, const s
 }
 
 /* errors[NODES]: what earlier presses leave in each sensor, as a share of the amplitude, at most half, 1 / 2^16. */
-#ifdef FT_WITHOUT_PAST
-FIXED_INLINE void set_past(int32_t shift, struct fit_propagation *propagation) { (void)shift, (void)propagation; }
-FIXED_INLINE void put_pasts(const uint8_t *sensor, const struct fit_settings *settings, const struct fit_propagation *propagation,
-                            int32_t *errors) {
+#ifdef FT_WITHOUT_HYSTERESIS
+FIXED_INLINE void set_hysteresis(int32_t shift, struct fit_propagation *propagation) { (void)shift, (void)propagation; }
+FIXED_INLINE void put_hysteresis(const uint8_t *sensor, const struct fit_settings *settings, const struct fit_propagation *propagation,
+                                 int32_t *errors) {
   (void)sensor, (void)settings, (void)propagation;
   memset(errors, 0, NODES * sizeof errors[0]);
 }
 #else
-FIXED_INLINE void set_past(int32_t shift, struct fit_propagation *propagation) {
-  propagation->past = fit_grid_reciprocal(propagation->amplitude);
-  propagation->past.exponent += shift - 28 + 16;
+FIXED_INLINE void set_hysteresis(int32_t shift, struct fit_propagation *propagation) {
+  propagation->hysteresis = fit_grid_reciprocal(propagation->amplitude);
+  propagation->hysteresis.exponent += shift - 28 + 16;
 }
-FIXED_INLINE void put_pasts(const uint8_t *sensor, const struct fit_settings *settings, const struct fit_propagation *propagation,
-                            int32_t *errors) {
+FIXED_INLINE void put_hysteresis(const uint8_t *sensor, const struct fit_settings *settings, const struct fit_propagation *propagation,
+                                 int32_t *errors) {
   int32_t any = INT16_MAX;
   for (int k = 0; k < NODES; k++) {
-    any |= settings->past_sd_Pa_q10[sensor[k]];
+    any |= settings->hysteresis_sd_Pa_q10[sensor[k]];
   }
   const int32_t less = fixed_bits((uint32_t)any) - 15;
   for (int k = 0; k < NODES; k++) {
-    const int32_t past = settings->past_sd_Pa_q10[sensor[k]] >> less;
-    errors[k] = fixed_clamp(shifted(past * propagation->past.mantissa, propagation->past.exponent + less), 0, INT16_MAX);
+    const int32_t hysteresis = settings->hysteresis_sd_Pa_q10[sensor[k]] >> less;
+    errors[k] = fixed_clamp(shifted(hysteresis * propagation->hysteresis.mantissa, propagation->hysteresis.exponent + less), 0, INT16_MAX);
   }
 }
 #endif
@@ -138,15 +139,15 @@ NOINLINE void fit_grid_begin_propagation(int32_t shift, const struct fit_equatio
   propagation->inverse_stiffness = fit_grid_reciprocal(equations->stiffness);
   struct units units;
   set_units(columns, propagation, &units);
-  set_location_moves(equations, &units, propagation);
-  set_force_moves(equations, &units, propagation);
+  set_location_influence(equations, &units, propagation);
+  set_force_influence(equations, &units, propagation);
 
   int32_t rise_q10 = fixed_clamp(equations->rise_q22 >> 12, 0, DOWN_MAX_Q10);
   int32_t most_q21 = (rise_q10 * rise_q10) * 2;
   most_q21 = most_q21 > SHAPE_USUAL_Q21 ? most_q21 : SHAPE_USUAL_Q21;
   propagation->shape_shift = fixed_bits((uint32_t)most_q21) - 15;
 
-  set_past(shift, propagation);
+  set_hysteresis(shift, propagation);
   propagation->elongation_shift = (struct scaled){0, 0};
   propagation->by_gains = propagation->force_by_gains = 0;
 }
@@ -171,7 +172,7 @@ NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid, const struc
   const uint8_t *sensor = grid->sensor;
   int32_t *errors = work->q14;
   uint32_t most = fit_has_dip(settings) ? (uint32_t)FIT_DIP_ERROR_Q16 >> 1 : 1; /* the dip is at most a quarter */
-  put_pasts(sensor, settings, propagation, errors);
+  put_hysteresis(sensor, settings, propagation, errors);
   for (int k = 0; k < NODES; k++) {
     most |= (uint32_t)fixed_hypot(settings->gain_sd_q16[sensor[k]], errors[k]);
   }
@@ -181,8 +182,8 @@ NOINLINE void fit_grid_set_errors(const struct fit_grid_shape *grid, const struc
   at_node = work->q28;
   for (int k = 0; k < NODES; k++) {
     uint32_t gain = (uint32_t)settings->gain_sd_q16[sensor[k]] << gain_shift;
-    int32_t past = shifted(errors[k], propagation->gain_shift);
-    int32_t error = fixed_hypot((int32_t)((gain * (uint32_t)at_node[k]) >> 16), past);
+    int32_t hysteresis = shifted(errors[k], propagation->gain_shift);
+    int32_t error = fixed_hypot((int32_t)((gain * (uint32_t)at_node[k]) >> 16), hysteresis);
     errors[k] = error;
     gains += (uint32_t)(error * error) >> PROPAGATION_SQUARE_SHIFT;
   }

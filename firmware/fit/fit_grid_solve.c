@@ -5,7 +5,7 @@
 #include "fit/fit_math.h"
 
 /* Longest step: 0.6 pitch in x and y, 0.4 of sigma. A longer one is shortened as a whole (NUMERICS.md, "Step"). */
-#define MOVE_INVERSE_Q6 107 /* 1 / 0.6 */
+#define STEP_INVERSE_Q6 107 /* 1 / 0.6 */
 #define RATIO_INVERSE_Q1 5  /* 1 / 0.4 */
 /* An iterate may leave the box of the result by this much, for the same reason. */
 #define OVERSHOOT_Q26 (ONE_Q26 / 4)
@@ -13,7 +13,7 @@
 #define PEAK_RISE_MAX_Q22 (20 << 22)                      /* a factor of a million */
 #define MODEL_INVERSE_SQUARE ((struct scaled){22756, -9}) /* 1 / FIT_MODEL_RESIDUAL^2 */
 #define ROUGH_INVERSE_SQUARE ((struct scaled){20000, -3}) /* 1 / FIT_ROUGH_RESIDUAL^2 */
-#define FLAT_HEIGHT_Q26 2016200                           /* FIT_FLAT_SIGMA */
+#define FLAT_CURVATURE_Q26 2016200                        /* FIT_FLAT_SIGMA */
 #define BOUND_SD ((struct scaled){19661, -14})            /* FIT_BOUND_SD */
 
 FIXED_INLINE struct scaled scaled_square(struct scaled a) { return scaled_mul(a, a); }
@@ -59,8 +59,8 @@ void fit_grid_step(const struct fit_grid_shape *grid, struct fit_equations *equa
   int32_t dy = (c2 >> 4) + fixed_mul_q32(2 * equations->at.y - equations->slope_y, ratio);
 
   /* The largest component in units of its limit, Q14. */
-  uint32_t most = (fixed_magnitude(dx) >> 9) * MOVE_INVERSE_Q6 >> 5;
-  uint32_t other = (fixed_magnitude(dy) >> 9) * MOVE_INVERSE_Q6 >> 5;
+  uint32_t most = (fixed_magnitude(dx) >> 9) * STEP_INVERSE_Q6 >> 5;
+  uint32_t other = (fixed_magnitude(dy) >> 9) * STEP_INVERSE_Q6 >> 5;
   most = other > most ? other : most;
   other = (fixed_magnitude(ratio) >> 14) * RATIO_INVERSE_Q1 >> 1;
   most = other > most ? other : most;
@@ -70,8 +70,8 @@ void fit_grid_step(const struct fit_grid_shape *grid, struct fit_equations *equa
     dy = fixed_mul_16(dy, share_q15) * 2;
     ratio = fixed_mul_16(ratio, share_q15) * 2;
   }
-  equations->move_x_q22 = dx;
-  equations->move_y_q22 = dy;
+  equations->step_x_q22 = dx;
+  equations->step_y_q22 = dy;
   state->x = fixed_clamp(equations->at.x + dx * 16, grid->x_min - OVERSHOOT_Q26, grid->x_max + OVERSHOOT_Q26);
   state->y = fixed_clamp(equations->at.y + dy * 16, grid->y_min - OVERSHOOT_Q26, grid->y_max + OVERSHOOT_Q26);
 
@@ -131,8 +131,8 @@ FIXED_INLINE struct scaled scaled_mean(struct scaled sum, int count) {
 }
 
 /* Raises the inverse of d3, so that times the variance of a reading it gives that of c3: the prior's row has another variance. */
-static NOINLINE void widen_for_prior(const struct readings *readings, const struct fit_equations *equations, const struct scaled *variance,
-                                     struct scaled *inverse3) {
+static NOINLINE void add_prior_variance(const struct readings *readings, const struct fit_equations *equations,
+                                        const struct scaled *variance, struct scaled *inverse3) {
   struct scaled excess = fit_scaled_short(scaled_sub(scaled_square(readings->prior_sd), *variance));
   if (excess.mantissa > 0) {
     struct scaled share = scaled_mul(equations->prior_row, *inverse3);
@@ -169,7 +169,7 @@ static NOINLINE uint32_t flags_of(const struct fit_grid_shape *grid, const struc
   if (settings->noise_Pa_q10 > port_divide(readings->largest, FIT_LOW_SIGNAL_SIGMA)) {
     flags |= CONTACT_FLAG_LOW_SIGNAL;
   }
-  if (state->curvature <= FLAT_HEIGHT_Q26) {
+  if (state->curvature <= FLAT_CURVATURE_Q26) {
     flags |= CONTACT_FLAG_FLAT;
   }
   if (state->x <= grid->x_min || state->x >= grid->x_max || state->y <= grid->y_min || state->y >= grid->y_max ||
@@ -254,7 +254,7 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   set_scatter(readings, settings, equations, propagation, count, &scatter, result);
   struct scaled inverse3 = propagation->inverse3;
   if (readings->prior_weight.mantissa != 0) {
-    widen_for_prior(readings, equations, &scatter.all, &inverse3);
+    add_prior_variance(readings, equations, &scatter.all, &inverse3);
   }
 
   struct scaled pitch = scaled_near(grid->pitch, grid->pitch_exponent - 6);
@@ -262,9 +262,9 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
                                   scaled_square(scaled_mul(propagation->inverse_stiffness, pitch))); /* mm */
   struct scaled sd = fit_scaled_sqrt(scaled_mul(scatter.noise, form));
   result->location_noise_mm = fit_scaled_float(sd);
-  struct scaled move_x = fit_scaled_from(equations->move_x_q22, -22); /* what it moved is not settled */
-  struct scaled move_y = fit_scaled_from(equations->move_y_q22, -22);
-  struct scaled elongation_shift = scaled_add(scaled_square(move_x), scaled_square(move_y));
+  struct scaled step_x = fit_scaled_from(equations->step_x_q22, -22); /* what it moved is not settled */
+  struct scaled step_y = fit_scaled_from(equations->step_y_q22, -22);
+  struct scaled elongation_shift = scaled_add(scaled_square(step_x), scaled_square(step_y));
   elongation_shift = scaled_add(scaled_add(propagation->location_variance, propagation->elongation_shift), elongation_shift);
   elongation_shift = scaled_mul(elongation_shift, scaled_square(pitch));
   sd = flags & CONTACT_FLAG_AT_BOUND ? scaled_mul(BOUND_SD, pitch)
@@ -283,8 +283,8 @@ bool fit_grid_conclude(const struct fit_grid_shape *grid, const struct readings 
   if (scatter.other_model) {
     flags |= CONTACT_FLAG_MODEL;
   }
-  int32_t x_q22 = fixed_clamp(equations->move_x_q22, -(1 << 15), 1 << 15);
-  int32_t y_q22 = fixed_clamp(equations->move_y_q22, -(1 << 15), 1 << 15);
+  int32_t x_q22 = fixed_clamp(equations->step_x_q22, -(1 << 15), 1 << 15);
+  int32_t y_q22 = fixed_clamp(equations->step_y_q22, -(1 << 15), 1 << 15);
   bool settled = ((x_q22 * x_q22) >> 1) + ((y_q22 * y_q22) >> 1) <= grid->settled_square;
   result->flags |= flags;
   return scatter.misfit && scatter.rough && settled;

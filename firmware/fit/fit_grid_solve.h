@@ -27,7 +27,7 @@ struct fit_equations {
   struct scaled prior_row;        /* what the prior adds to the matrix is its square */
   struct scaled square_sum;       /* of the residuals; the last iteration alone needs it */
   int32_t c1_q26, c2_q26, c3_q28; /* the step along p1, p2, p3, before any limit */
-  int32_t move_x_q22, move_y_q22; /* the step taken */
+  int32_t step_x_q22, step_y_q22; /* the step taken */
 };
 
 #define STIFFNESS_PER_CURVATURE_Q14 22713 /* 2 / log2(e) = 1 / (sigma^2 curvature) */
@@ -96,9 +96,9 @@ struct fit_propagation {
   struct scaled amplitude, inverse_stiffness;               /* the latter 1 / stiffness */
   /* dF / F is that of e, p1, p2 and p3 times 1, off_x, off_y (Q26) and centre_q24. */
   int32_t off_x, off_y, centre_q24;
-  struct scaled past;  /* 1/1024 Pa in shares of the amplitude, 1 / 2^16 */
-  int32_t gain_shift;  /* gains Q16 are used with this number of bits more */
-  int32_t shape_shift; /* the model error's shape in Q(21 - shape_shift) */
+  struct scaled hysteresis; /* 1/1024 Pa in shares of the amplitude, 1 / 2^16 */
+  int32_t gain_shift;       /* gains Q16 are used with this number of bits more */
+  int32_t shape_shift;      /* the model error's shape in Q(21 - shape_shift) */
   /* Sums over the sensors. */
   uint32_t gains;    /* of the squared errors of the readings */
   uint32_t by_gains; /* of the squares of what they make of x and y */
@@ -119,8 +119,8 @@ void fit_grid_begin_propagation(int32_t shift, const struct fit_equations *equat
 void fit_grid_end_propagation(const struct fit_settings *settings, const struct fit_equations *equations,
                               struct fit_propagation *propagation);
 
-/* Reuses the memory of the readings, [node]. In: e (Q15) in q28. Out: the error of each reading by gain and past in q14, as a share of the
- * amplitude times 2^(16 + gain_shift); the shape of the model's error in residual; both of 15 bits. */
+/* Reuses the memory of the readings, [node]. In: e (Q15) in q28. Out: the error of each reading by gain and hysteresis in q14, as a share
+ * of the amplitude times 2^(16 + gain_shift); the shape of the model's error in residual; both of 15 bits. */
 void fit_grid_set_errors(const struct fit_grid_shape *grid, const struct fit_settings *settings, const struct state *at,
                          struct readings *work, struct fit_propagation *propagation);
 

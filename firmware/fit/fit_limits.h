@@ -32,7 +32,7 @@
 /* The errors of a reading in the standard deviations, independent of each other (NUMERICS.md, "Errors"):
  *   the noise;
  *   its gain's: gain_sd times the model there;
- *   what its rubber keeps of presses: past_sd;
+ *   the hysteresis of its rubber: hysteresis_sd;
  *   the model's: model_sd times the largest reading, alike for every sensor;
  *   its shape's: one amplitude for all sensors,
  *   FIT_SHAPE_PER_MODEL model_sd (FIT_SHAPE_SIGMA / sigma)^2 amplitude e (r / sigma)^4, for the force
@@ -129,11 +129,11 @@ static inline bool fit_is_rectangle(const struct fit_array *array) {
 
 /* What a reading below zero counts as. */
 static inline int32_t fit_reading(const struct fit_settings *settings, int32_t pressure_Pa_q10) {
-  if (settings->cut_noises == 0 || pressure_Pa_q10 >= 0) {
+  if (settings->clip_below_sds == 0 || pressure_Pa_q10 >= 0) {
     return pressure_Pa_q10;
   }
   int32_t noise = settings->noise_Pa_q10 < 1 << 22 ? settings->noise_Pa_q10 : 1 << 22;
-  return pressure_Pa_q10 < -noise * settings->cut_noises ? 0 : pressure_Pa_q10;
+  return pressure_Pa_q10 < -noise * settings->clip_below_sds ? 0 : pressure_Pa_q10;
 }
 
 /* Whether the fit without an outlier is the better one. rough: its residuals still are. An outlier above the others

@@ -118,7 +118,7 @@ struct fit_shapes_pad {
 enum ft_status fit_shapes_init(struct fit_shapes_pad *pad, const struct fit_array *array, const struct pad_profile *profile);
 
 /* Returns whether the result is of this frame. Else the one before remains: every other frame only steps, and so do the first frames of a
- * contact. fit: of the same readings, after their gains. settings: with the pad's dip, and cut_noises 0. */
+ * contact. fit: of the same readings, after their gains. settings: with the pad's dip, and clip_below_sds 0. */
 bool fit_shapes(const struct fit_array *array, struct fit_shapes_pad *pad, const int32_t *pressure_Pa_q10,
                 const struct fit_settings *settings, const struct fit_result *fit, struct fit_shapes_state *state,
                 struct fit_shapes_result *result);

@@ -32,7 +32,7 @@ struct problem {
   const struct fit_pad *pad;
   struct readings readings;
   struct fit_base base;
-  int32_t by_gains_q12; /* share of the readings' variances that gains and past make, mean */
+  int32_t by_gains_q12; /* share of the readings' variances that gains and hysteresis make, mean */
   int32_t model_sd_q16;
   /* The dip, -depth v0 / v exp(-d' d / (2 v)), v = v0 + t as of a term: depth v0, 0: none; v0. */
   int32_t dip_q22, dip_variance_q26;

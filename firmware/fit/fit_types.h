@@ -57,9 +57,9 @@ struct fit_settings {
   /* Weak prior on sigma, for rubber so stiff that the array can hardly determine it: one more row FIT_PRIOR_WEIGHT
    * largest (sigma - prior_sigma) / prior_width. None unless the width is 0.001..10000 mm and sigma 0..10000 mm. */
   float prior_sigma_mm, prior_width_mm;
-  /* A reading cut_noises noise_Pa below zero counts as zero, since a Gaussian is never negative. 0: no
+  /* A reading more than clip_below_sds noise_Pa below zero counts as zero, since a Gaussian is never negative. 0: no
    * reading is changed, as a tangential force asks for. */
-  uint8_t cut_noises;
+  uint8_t clip_below_sds;
   /* What the rubber takes from the readings around a contact, where that is known: dip_share p0 exp(-r^2 / (2 dip_sd^2)). Readings are not
    * cut then. None unless the share is above 0 and at most FIT_DIP_SHARE_MAX, and the sd is 0.001..10000 mm. */
   float dip_share, dip_sd_mm;
@@ -67,10 +67,10 @@ struct fit_settings {
    * two of three and more iterations. */
   const struct fit_deviation *deviations;
   /* Other errors that the standard deviations contain. */
-  uint16_t gain_sd_q16[FT_MAX_SENSORS];   /* [sensor] relative sd of its gain; 0: exact */
-  int32_t past_sd_Pa_q10[FT_MAX_SENSORS]; /* [sensor] sd of what rubber keeps, before gains, 1/1024 Pa; 0..2^29 */
-  uint16_t model_sd_q16;                  /* sd of the model's own error, as a share of the largest reading; 0: none */
-  float location_sd_limit_mm;             /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
+  uint16_t gain_sd_q16[FT_MAX_SENSORS];         /* [sensor] relative sd of its gain; 0: exact */
+  int32_t hysteresis_sd_Pa_q10[FT_MAX_SENSORS]; /* [sensor] sd of the hysteresis of its rubber, before gains, 1/1024 Pa; 0..2^29 */
+  uint16_t model_sd_q16;                        /* sd of the model's own error, as a share of the largest reading; 0: none */
+  float location_sd_limit_mm;                   /* UNCERTAIN above it; 0: FIT_LOCATION_SD_LIMIT_mm */
 };
 #define FIT_LOCATION_SD_LIMIT_mm 0.6f
 #define FIT_PRIOR_WEIGHT 0.01f
@@ -101,9 +101,9 @@ struct fit_result {
 #define FIT_OUTLIER_FRAMES 128
 #define FIT_OUTLIER_RETRY_FRAMES 8
 struct fit_outlier_state {
-  sensor_map usable;   /* of these sensors */
-  sensor_map left_out; /* bitmap of at most one */
-  uint16_t frames;     /* for which it is still valid */
+  sensor_map usable;  /* of these sensors */
+  sensor_map outlier; /* bitmap of at most one */
+  uint16_t frames;    /* for which it is still valid */
   float residual_rms_Pa, force_N;
   struct fit_result refit; /* working memory of a search */
 };

@@ -155,7 +155,7 @@ class Frames(unittest.TestCase):
         touches["force_N"], touches["pull_x_N"] = 6.0, np.linspace(0, 1.4, 8)
         base_Pa = MEASURE.base_pressure("sphere15", 12.0, touches)
         readings = np.ascontiguousarray(np.repeat(q10(base_Pa)[:, None], 6, axis=1))
-        _, loads = MEASURE.tangential(ARRAY, MEASURE.profile(12.0), MEASURE.settings(noise_Pa=2.0, cut_noises=0), readings)
+        _, loads = MEASURE.tangential(ARRAY, MEASURE.profile(12.0), MEASURE.settings(noise_Pa=2.0, clip_below_sds=0), readings)
         self.assertTrue(loads["valid"][:, -1].all())
         self.assertLess(abs(loads["qx_N"][:, -1] - touches["pull_x_N"]).max(), 0.2)
 

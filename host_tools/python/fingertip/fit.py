@@ -245,7 +245,7 @@ def inputs(
     known = calibration or {}
     prior = {} if has_profile else {"prior_sigma_mm": known.get("sigma_mm", 0.0), "prior_width_mm": known.get("sigma_sd_mm", 0.0)}
     dip = {name: known.get(name, 0.0) for name in ("dip_share", "dip_sd_mm")}
-    cut = {"cut_noises": 0} if has_profile else {}
+    cut = {"clip_below_sds": 0} if has_profile else {}
     settings = chip.settings(noise_Pa=noise_Pa, gain_sd=known.get("gain_sd") or None, **(prior | dip | cut | fields))
     own = None
     if known.get("off_x_mm"):

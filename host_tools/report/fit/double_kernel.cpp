@@ -22,11 +22,11 @@ struct Normal {
 };
 
 constexpr double GUESS_SHARE = 0.01;
-constexpr double GUESS_NOISES = 5.0;
+constexpr double GUESS_NOISE_SDS = 5.0;
 constexpr double GUESS_WEIGHT = 3e-3;
 constexpr double GUESS_SIGMA = 0.42;
-constexpr double MOVE_LIMIT = 0.65;
-constexpr double WIDEN_LIMIT = 0.5;
+constexpr double STEP_MAX = 0.65;
+constexpr double WIDTH_STEP_MAX = 0.5;
 constexpr double OVERSHOOT = 0.25;
 constexpr double P0_MIN = 0.05;
 constexpr double P0_MAX = 1e6;
@@ -89,7 +89,7 @@ Gaussian first_guess(const Samples &samples, double noise_Pa) {
   const auto first = samples.p.begin();
   const auto peak = static_cast<std::size_t>(std::max_element(first, first + static_cast<std::ptrdiff_t>(samples.count)) - first);
   const double x_peak = samples.x[peak], y_peak = samples.y[peak];
-  const double least = std::clamp(GUESS_NOISES * noise_Pa / samples.unit_Pa, GUESS_SHARE, 0.99);
+  const double least = std::clamp(GUESS_NOISE_SDS * noise_Pa / samples.unit_Pa, GUESS_SHARE, 0.99);
   Normal normal;
   normal.matrix.diagonal().setConstant(GUESS_WEIGHT);
   normal.rhs[3] = -GUESS_WEIGHT * 0.5 / (GUESS_SIGMA * GUESS_SIGMA);
@@ -133,7 +133,7 @@ KernelResult double_kernel(const fit_array &array, const std::int32_t *pressure_
     }
     const double gain = theta.sigma * theta.sigma / theta.p0;
     const Vector4 b = normal.matrix.ldlt().solve(normal.rhs);
-    const double excess = gain * std::max({std::abs(b[1]) / MOVE_LIMIT, std::abs(b[2]) / MOVE_LIMIT, std::abs(b[3]) / WIDEN_LIMIT});
+    const double excess = gain * std::max({std::abs(b[1]) / STEP_MAX, std::abs(b[2]) / STEP_MAX, std::abs(b[3]) / WIDTH_STEP_MAX});
     const double share = excess > 1.0 ? 1.0 / excess : 1.0;
     theta.p0 = limited(theta.p0 + share * b[0], P0_MIN, P0_MAX);
     theta.x = limited(theta.x + share * gain * b[1], x_min - OVERSHOOT, x_max + OVERSHOOT);

@@ -67,7 +67,7 @@ class Bench:
     def fit(self, kernel, variant, readings, usable, noise_Pa, threads=2):
         """(results with x_mm, y_mm, flags, microseconds for each)"""
         if kernel in FIRMWARE:
-            settings = self.measure.settings(len(readings), gain_sd=0.0, cut_noises=0, iterations=variant.iterations)
+            settings = self.measure.settings(len(readings), gain_sd=0.0, clip_below_sds=0, iterations=variant.iterations)
             settings["noise_Pa_q10"] = (1024 * noise_Pa).astype(np.int32)
             return self.measure.timed_fit(self.array, settings, readings, usable, kernel=kernel, threads=threads)
         return self.compared.compare(kernel, variant.iterations, noise_Pa, readings, usable, variant.firmware_guess, threads)

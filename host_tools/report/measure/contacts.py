@@ -140,7 +140,12 @@ class Contacts(Measure):
     def settings_of(self, pads, noise_Pa):
         """As the firmware has them where a profile is set, for each pad."""
         return self.settings(
-            len(pads), noise_Pa=noise_Pa, gain_sd=pads["gain_sd"], cut_noises=0, dip_share=pads["dip_share"], dip_sd_mm=pads["dip_sd_mm"]
+            len(pads),
+            noise_Pa=noise_Pa,
+            gain_sd=pads["gain_sd"],
+            clip_below_sds=0,
+            dip_share=pads["dip_share"],
+            dip_sd_mm=pads["dip_sd_mm"],
         )
 
     def own_of(self, pads):
@@ -168,14 +173,14 @@ class Contacts(Measure):
         published[~found] = 0
         return published, found
 
-    def held_shapes(self, readings_Pa, pads, noise_Pa, published, profile, past_sd_Pa=0.0):
+    def held_shapes(self, readings_Pa, pads, noise_Pa, published, profile, hysteresis_sd_Pa=0.0):
         """(fit_shapes_result, shapes_location), each [touch, first or last], of contacts [touch, frame, sensor]."""
         pad = self.made("fit_shapes_pad", 1)
         self.call("shapes_pad", self.own_array, profile, pad)
         own = self.own_of(pads)
         found = self.made("fit_shapes_result", len(readings_Pa), 2), self.made("shapes_location", len(readings_Pa), 2)
         settings = self.settings_of(pads, noise_Pa)
-        settings["past_sd_Pa_q10"][:, :SENSORS] = q10(past_sd_Pa)
+        settings["hysteresis_sd_Pa_q10"][:, :SENSORS] = q10(hysteresis_sd_Pa)
         readings = q10(readings_Pa), self.usable(readings_Pa), published
         self.call("held_shapes", self.own_array, pad, settings, self.no_own if own is None else own, *readings, *found)
         return found

@@ -160,10 +160,10 @@ static void gate_run(Batch<gate_pad, 1> pads, std::int64_t frames, Batch<const d
 MEASURE_ENTRY(gate_run)
 
 // The firmware's condition of readings [frame][sensor], 1/1024 Pa. Of each frame: flags (enum Flag), bitmap of the
-// usable sensors, and pressure [frame][sensor] above the zero; and past_sd of the last frame.
+// usable sensors, and pressure [frame][sensor] above the zero; and hysteresis_sd of the last frame.
 static void gate_series(double noise_Pa, Batch<const std::uint64_t, 1> t_us, Batch<const std::int32_t, 2> reading_Pa_q10,
                         Batch<std::uint8_t, 1> flags, Batch<sensor_map, 1> usable, Batch<std::int32_t, 2> pressure_Pa_q10,
-                        Batch<std::int32_t, 1> past_sd_Pa_q10) {
+                        Batch<std::int32_t, 1> hysteresis_sd_Pa_q10) {
   same_length(t_us, reading_Pa_q10, flags, usable, pressure_Pa_q10);
   const std::size_t sensors = reading_Pa_q10.size(1);
   require(sensors <= FT_MAX_SENSORS && pressure_Pa_q10.size(1) == sensors, "another number of sensors");
@@ -183,6 +183,6 @@ static void gate_series(double noise_Pa, Batch<const std::uint64_t, 1> t_us, Bat
     usable[i] = readings.usable;
     std::copy_n(readings.pressure_Pa_q10, sensors, pressure_Pa_q10.row(i));
   }
-  std::copy_n(state.past_sd_Pa_q10, std::min(sensors, past_sd_Pa_q10.size()), past_sd_Pa_q10.data);
+  std::copy_n(state.hysteresis_sd_Pa_q10, std::min(sensors, hysteresis_sd_Pa_q10.size()), hysteresis_sd_Pa_q10.data);
 }
 MEASURE_ENTRY(gate_series)

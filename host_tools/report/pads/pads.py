@@ -33,7 +33,7 @@ def p99_9_um(measure, columns, rows, count, random):
     pressure_Pa = presses.gaussian_Pa(compared.x_mm, compared.y_mm, x_mm, y_mm, sigma_mm, p0_Pa)
     readings = q10(pressure_Pa + NOISE_Pa * random.normal(size=pressure_Pa.shape))
     best = compared.optimum(readings, np.full(count, (1 << columns * rows) - 1, np.uint64), np.full(count, NOISE_Pa))
-    settings = measure.settings(noise_Pa=NOISE_Pa, iterations=ITERATIONS, cut_noises=0)
+    settings = measure.settings(noise_Pa=NOISE_Pa, iterations=ITERATIONS, clip_below_sds=0)
     found = measure.fit(measure.array(compared.x_mm, compared.y_mm, arrays.PITCH_mm), settings, readings)
     judged = best["observable"] & ~best["at_bound"]
     assert judged.mean() > 0.9, "too few presses are judged"

@@ -19,7 +19,7 @@ def rows(presses, measured):
     """measured: for each pad (fingertip, readings [press, sensor], xy_mm [press, 2], calibration)."""
     error_mm, run_time = {}, {}
     for fingertip, readings, xy_mm, calibration in measured:
-        ways = {"published": {"cut_noises": 0}, "shipped": {}, "calibrated": {"response": calibration.response}}
+        ways = {"published": {"clip_below_sds": 0}, "shipped": {}, "calibrated": {"response": calibration.response}}
         keys = [(way, iterations) for way in ways for iterations in ITERATIONS]
         us = dict(zip(keys, fingertip.us([fingertip.inputs(readings, iterations=iterations, **ways[way]) for way, iterations in keys])))
         for way, iterations in keys:

@@ -17,8 +17,8 @@ using fingertip::twin::in_parallel;
 
 MEASURE_RECORD(fit_array, FIELD(sensor_count), FIELD(pitch_mm), FIELD(x), FIELD(y))
 MEASURE_RECORD(fit_deviation, FIELD(off_x_q15), FIELD(off_y_q15), FIELD(wider_q15))
-MEASURE_RECORD(fit_settings, FIELD(iterations), FIELD(noise_Pa_q10), FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(cut_noises),
-               FIELD(dip_share), FIELD(dip_sd_mm), FIELD(gain_sd_q16), FIELD(past_sd_Pa_q10), FIELD(model_sd_q16),
+MEASURE_RECORD(fit_settings, FIELD(iterations), FIELD(noise_Pa_q10), FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(clip_below_sds),
+               FIELD(dip_share), FIELD(dip_sd_mm), FIELD(gain_sd_q16), FIELD(hysteresis_sd_Pa_q10), FIELD(model_sd_q16),
                FIELD(location_sd_limit_mm))
 MEASURE_RECORD(fit_result, FIELD(x_mm), FIELD(y_mm), FIELD(p0_Pa), FIELD(sigma_mm), FIELD(force_N), FIELD(residual_rms_Pa),
                FIELD(location_sd_mm), FIELD(location_noise_mm), FIELD(force_sd_N), FIELD(sigma_x_mm), FIELD(sigma_y_mm),
@@ -45,7 +45,7 @@ static void default_settings(Batch<fit_settings, 1> settings) {
   for (std::size_t i = 0; i < settings.size(); i++) {
     settings[i] = {};
     settings[i].iterations = DEFAULT_FIT_ITERATIONS;
-    settings[i].cut_noises = DEFAULT_CUT_NOISES;
+    settings[i].clip_below_sds = DEFAULT_CLIP_BELOW_SDS;
     fit_set_errors(&settings[i], DEFAULT_GAIN_SD, DEFAULT_MODEL_SD);
   }
 }
@@ -105,7 +105,7 @@ static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings,
       fit_gaussian(array, pressure + sensors, usable.row(press)[i], &settings, &results[press]);
     }
     if (frames > 1) {
-      fit_bias_widen(&bias, array, &settings, &results[press]);
+      fit_bias_add(&bias, array, &settings, &results[press]);
     }
   });
 }

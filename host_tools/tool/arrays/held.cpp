@@ -123,7 +123,7 @@ static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes
       fit_bias_step(&bias, array, question.pressure_Pa_q10, &question.settings, &question.fit);
       const bool last = i == frames - 1;
       if (last || i == FIT_SHAPES_FRAMES - 1) {
-        fit_bias_widen(&bias, array, &question.settings, &question.fit);
+        fit_bias_add(&bias, array, &question.settings, &question.fit);
         fit_shapes_result &result = results.row(contact)[last ? 1 : 0];
         result = job->result;
         result.shape = job->report.shape; // which stays, while what is none of these begins again

@@ -319,7 +319,7 @@ struct FirmwareFit {
         fit_array_init(&of, static_cast<std::uint8_t>(array.sensors()), x.data(), y.data(), static_cast<float>(array.pitch_mm)) == FT_OK;
     settings.iterations = ITERATIONS;
     settings.noise_Pa_q10 = NOISE_Pa_Q10;
-    settings.cut_noises = CUT_NOISES;
+    settings.clip_below_sds = CLIP_BELOW_SDS;
     settings.prior_sigma_mm = static_cast<float>(shape.sigma_mm);
     settings.prior_width_mm = static_cast<float>(shape.sigma_sd_mm);
     settings.dip_share = static_cast<float>(shape.dip_share);
@@ -341,7 +341,7 @@ struct FirmwareFit {
     return result;
   }
   /* The firmware's own settings (config/defaults.h), without a pad profile; a mean of many frames has hardly any noise. */
-  static constexpr std::uint8_t ITERATIONS = 4, CUT_NOISES = 4;
+  static constexpr std::uint8_t ITERATIONS = 4, CLIP_BELOW_SDS = 4;
   static constexpr std::int32_t NOISE_Pa_Q10 = 1024;
   std::vector<fit_deviation> own;
   fit_array of{};

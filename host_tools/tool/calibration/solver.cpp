@@ -159,11 +159,11 @@ double Solution::worst_shape_sd() const {
 }
 
 void set_earlier(std::vector<Placement> &placements) {
-  const double fading = std::exp(-RESTED_BEFORE_s / LET_GO_s);
+  const double fading = std::exp(-RESTED_BEFORE_s / RELEASED_s);
   std::vector<double> most_Pa;
   double at_s = placements.empty() ? 0.0 : placements[0].t_s;
   for (Placement &placement : placements) {
-    const double until_rest = std::exp(std::min(at_s + RESTED_BEFORE_s - placement.t_s, 0.0) / LET_GO_s);
+    const double until_rest = std::exp(std::min(at_s + RESTED_BEFORE_s - placement.t_s, 0.0) / RELEASED_s);
     most_Pa.resize(placement.reading_Pa.size(), 0.0);
     placement.earlier_Pa = most_Pa;
     for (std::size_t k = 0; k < most_Pa.size(); k++) {

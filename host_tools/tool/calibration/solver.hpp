@@ -56,13 +56,13 @@ struct Placement {
   std::vector<double> reading_Pa; /* [sensor] above zero, mean over the frames */
   sensor_map usable = 0;          /* bitmap of the sensors whose reading is a measurement */
   std::vector<double> rest_Pa;    /* [sensor] just before it, of any origin; empty: not known */
-  std::vector<double> earlier_Pa; /* [sensor] M: by how much less is let go of than at rest (set_earlier); empty: none */
+  std::vector<double> earlier_Pa; /* [sensor] M: by how much less is released than at rest (set_earlier); empty: none */
   double noise_Pa = 0.0;          /* sd of a mean */
   double fading = 0.0;            /* share of them that the readings together lose in the half second */
 };
 
-/* As in firmware/condition: what was let go of, more than is pressed now, fades with it. */
-constexpr double LET_GO_s = 2.0;
+/* As in firmware/condition: the pressure that was released, more than is pressed now, fades with it. */
+constexpr double RELEASED_s = 2.0;
 /* Sets earlier_Pa of all placements of a session, in the order of time. judge() does. */
 void set_earlier(std::vector<Placement> &placements);
 

@@ -149,7 +149,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     settings.prior_width_mm = (float)draw_between(1, 64) / 32.0f;
   }
   if (kernel != FIT_BITS_TANGENTIAL && press % 5 == 1) {
-    settings.cut_noises = 4;
+    settings.clip_below_sds = 4;
     settings.dip_share = (float)draw_between(1, 100) / 1024.0f;
     settings.dip_sd_mm = (float)draw_between(4, 64);
   }
@@ -168,7 +168,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
   if (press % 2) {
     for (int k = 0; k < SENSORS_MOST; k++) {
       settings.gain_sd_q16[k] = (uint16_t)(draw_between(0, 1 << 16) >> draw_between(1, 12));
-      settings.past_sd_Pa_q10[k] = draw_between(0, 1 << 20) >> draw_between(0, 12);
+      settings.hysteresis_sd_Pa_q10[k] = draw_between(0, 1 << 20) >> draw_between(0, 12);
     }
     settings.model_sd_q16 = (uint16_t)(draw_between(0, 1 << 14) >> draw_between(0, 8));
   }
@@ -228,7 +228,7 @@ uint32_t fit_bits_of(enum fit_bits_kernel kernel, uint32_t press) {
     for (int part = 0; part < FIT_BIAS_PARTS; part++) {
       fit_bias_step(&load, array, pressure_Pa_q10, &settings, &result);
     }
-    fit_bias_widen(&load, array, &settings, &result);
+    fit_bias_add(&load, array, &settings, &result);
   }
   if (kernel == FIT_BITS_TANGENTIAL) {
     struct fit_tangential found[FRAMES];

@@ -184,7 +184,7 @@ TEST(a_search_for_an_outlier_is_of_fast_frames) {
   put(1.5, -4.0, 5.0);
   last_of_press();
   app.stages.location.outliers = (struct fit_outlier_state){.usable = app.found.conditioned.usable,
-                                                            .left_out = 1,
+                                                            .outlier = 1,
                                                             .frames = 9,
                                                             .residual_rms_Pa = app.found.fit.residual_rms_Pa,
                                                             .force_N = app.found.fit.force_N};
@@ -196,7 +196,7 @@ TEST(a_search_for_an_outlier_is_of_fast_frames) {
   app.found.frame.t_us += 3700;
   app_process_frame(&app, app.found.frame.t_read_us);
   TEST_ASSERT_EQUAL_HEX32(app.found.conditioned.usable, app.found.fit.used);
-  TEST_ASSERT_EQUAL(0, app.stages.location.outliers.left_out);
+  TEST_ASSERT_EQUAL(0, app.stages.location.outliers.outlier);
 }
 
 /* Here each frame has time for several frames' worth of parts. */

@@ -152,17 +152,17 @@ TEST(a_profile_outlives_power_until_it_is_erased) {
     TEST_ASSERT_EQUAL_HEX32(WIRE_STORED_PAD, info.stored);
     TEST_ASSERT_EQUAL_MEMORY(&pad, &info.pad, 4 * PAD_PROFILE_FLOATS + 1);
     TEST_ASSERT_NOT_NULL(app.stages.tangential.profile);
-    TEST_ASSERT_EQUAL_UINT8(0, app.stages.location.settings.cut_noises);
+    TEST_ASSERT_EQUAL_UINT8(0, app.stages.location.settings.clip_below_sds);
     rig_power_up();
     connect_for(300);
   }
   obey((struct wire_packet){.type = WIRE_CMD_ERASE_PAD});
   TEST_ASSERT_NULL(app.stages.tangential.profile);
-  TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.stages.location.settings.cut_noises);
+  TEST_ASSERT_EQUAL_UINT8(DEFAULT_CLIP_BELOW_SDS, app.stages.location.settings.clip_below_sds);
   TEST_ASSERT_EQUAL_HEX32(0, get_info().stored);
   rig_power_up();
   TEST_ASSERT_NULL(app.stages.tangential.profile);
-  TEST_ASSERT_EQUAL_UINT8(DEFAULT_CUT_NOISES, app.stages.location.settings.cut_noises);
+  TEST_ASSERT_EQUAL_UINT8(DEFAULT_CLIP_BELOW_SDS, app.stages.location.settings.clip_below_sds);
 }
 
 /* The Gaussian is where the estimate begins, and what is left where there is none. */

@@ -241,7 +241,7 @@ TEST(Solver, finds_what_remains_of_the_placements_before) {
   const KnownPad pad(8);
   auto placements = good_session(pad, 30, 8);
   for (std::size_t i = 0; i < 30; i++) {
-    placements[i].t_s = (LET_GO_s + RESTED_BEFORE_s) * double(i);
+    placements[i].t_s = (RELEASED_s + RESTED_BEFORE_s) * double(i);
   }
   set_earlier(placements);
   auto remembering = placements;
@@ -249,7 +249,7 @@ TEST(Solver, finds_what_remains_of_the_placements_before) {
     double most_Pa = 0.0;
     for (std::size_t i = 0; i < 3; i++) {
       const double rest_Pa = most_Pa / M_E, reading_Pa = std::max(placements[i].reading_Pa[k], 0.0);
-      most_Pa = std::max(rest_Pa * std::exp(-RESTED_BEFORE_s / LET_GO_s), reading_Pa);
+      most_Pa = std::max(rest_Pa * std::exp(-RESTED_BEFORE_s / RELEASED_s), reading_Pa);
       EXPECT_NEAR(placements[i].earlier_Pa[k], rest_Pa - most_Pa + reading_Pa, 1e-9);
     }
     for (std::size_t i = 0; i < 30; i++) {

@@ -65,7 +65,7 @@ static uint32_t with_frame(uint32_t crc) {
   uint32_t words[7 + 2 * SENSORS] = {
       crc, usable, conditioned.tared, conditioned.contact, conditioned.zero_doubtful, (uint32_t)conditioned.peak_Pa_q10};
   memcpy(&words[7], conditioned.pressure_Pa_q10, SENSORS * sizeof words[0]);
-  memcpy(&words[7 + SENSORS], condition.past_sd_Pa_q10, SENSORS * sizeof words[0]);
+  memcpy(&words[7 + SENSORS], condition.hysteresis_sd_Pa_q10, SENSORS * sizeof words[0]);
   return crc32_iso_hdlc((const uint8_t *)words, sizeof words);
 }
 

@@ -227,7 +227,7 @@ TEST(test_what_a_sensor_keeps_shows_after_the_press_alone) {
     run_s(5);
     frame.valid = ALL;
     run_s(5);
-    TEST_ASSERT_EQUAL(PAST_SHARE, condition.sensor[7].past_share);
+    TEST_ASSERT_EQUAL(HYSTERESIS_SD, condition.sensor[7].hysteresis_q16);
   }
 }
 
@@ -236,17 +236,17 @@ TEST(test_what_a_sensor_keeps_shows_after_the_press_alone) {
 TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin_calm(periods_us[i]);
-    TEST_ASSERT_EQUAL(0, condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_EQUAL(0, condition.hysteresis_sd_Pa_q10[7]);
     hold(20000 * Pa, 3);
-    TEST_ASSERT_INT32_WITHIN(30 * Pa, (int32_t)(0.02f * 20000 * (1.0f - expf(-1.0f))) * Pa, condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_INT32_WITHIN(30 * Pa, (int32_t)(0.02f * 20000 * (1.0f - expf(-1.0f))) * Pa, condition.hysteresis_sd_Pa_q10[7]);
     press(0);
     frame.pressure_Pa_q10[1] += 20000 * Pa; /* the contact moves on */
     run_s(0.2f);
-    TEST_ASSERT_INT32_WITHIN(40 * Pa, 700 * Pa, condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_INT32_WITHIN(40 * Pa, 700 * Pa, condition.hysteresis_sd_Pa_q10[7]);
     press(0);
-    TEST_ASSERT_INT32_WITHIN(40 * Pa, 700 * Pa, condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_INT32_WITHIN(40 * Pa, 700 * Pa, condition.hysteresis_sd_Pa_q10[7]);
     run_s(30);
-    TEST_ASSERT_INT32_WITHIN(Pa, 0, condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_INT32_WITHIN(Pa, 0, condition.hysteresis_sd_Pa_q10[7]);
     keep(12, -0.1f, 3, 5);
     hold(20000 * Pa, 1);
     press(0);
@@ -255,7 +255,7 @@ TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
     run_s(0.2f);
     TEST_ASSERT_INT32_WITHIN(300 * Pa, 0, conditioned.pressure_Pa_q10[7]);
     hold(0, 0.15f);
-    TEST_ASSERT_INT32_WITHIN(200 * Pa, 1100 * Pa, condition.past_sd_Pa_q10[7]);
-    TEST_ASSERT_TRUE(condition.past_sd_Pa_q10[4] * 5 < condition.past_sd_Pa_q10[7]);
+    TEST_ASSERT_INT32_WITHIN(200 * Pa, 1100 * Pa, condition.hysteresis_sd_Pa_q10[7]);
+    TEST_ASSERT_TRUE(condition.hysteresis_sd_Pa_q10[4] * 5 < condition.hysteresis_sd_Pa_q10[7]);
   }
 }

@@ -349,11 +349,11 @@ TEST(test_a_pause_changes_no_zero_in_a_contact) {
 /* What is known of the rubber outlives a tare, and a sensor that comes back later waits for the contact's end. */
 TEST(test_a_tare_keeps_what_is_known) {
   begin_calm(4854);
-  condition.sensor[3].past_share = 8000;
+  condition.sensor[3].hysteresis_q16 = 8000;
   frame.valid = ALL & ~(1u << 14);
   condition_tare(&condition);
   run_s(2);
-  TEST_ASSERT_EQUAL_INT32(8000, condition.sensor[3].past_share);
+  TEST_ASSERT_EQUAL_INT32(8000, condition.sensor[3].hysteresis_q16);
   hold(20000 * Pa, 1);
   frame.valid = ALL;
   run_s(1);

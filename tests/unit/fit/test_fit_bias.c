@@ -37,7 +37,7 @@ static void press(double x_mm, double y_mm, double qx, double qy) {
 
 static void fit(void) { fit_gaussian(&array, readings, ALL, &settings, &result); }
 
-static void widen(void) { fit_bias_widen(&bias, &array, &settings, &result); }
+static void widen(void) { fit_bias_add(&bias, &array, &settings, &result); }
 
 static void follow(void) { fit_bias_step(&bias, &array, readings, &settings, &result); }
 

@@ -274,9 +274,9 @@ TEST(a_press_that_is_alike_everywhere_has_its_peak) {
 }
 
 TEST(readings_below_zero_count_as_zero) {
-  const struct fit_settings cut = {.iterations = 4, .noise_Pa_q10 = 5120, .cut_noises = 4};
+  const struct fit_settings cut = {.iterations = 4, .noise_Pa_q10 = 5120, .clip_below_sds = 4};
   struct fit_settings whole = cut;
-  whole.cut_noises = 0;
+  whole.clip_below_sds = 0;
   for (int i = 0; i < 100; i++) {
     random_press(3.2, 6.0);
     int32_t below[SENSORS];
@@ -357,7 +357,7 @@ TEST(a_known_dip_is_added_back_alike_in_all) {
     const double x = any_x(), y = any_y(), sigma = any(5.2, 6.0), sd = 3.2 * sigma;
     press_cast(x, y, sigma, 0.03, sd, no_deviations);
     struct fit_settings settings = of_cast(sigma, 0.0, sd);
-    settings.cut_noises = 4;
+    settings.clip_below_sds = 4;
     const struct fit_result plain = by_grid(&settings);
     settings.dip_share = 0.03f;
     judge(&settings, x, y, &worst, &apart);

@@ -165,10 +165,10 @@ static struct input draw(uint32_t number, const struct fit_array *on) {
   settings->noise_Pa_q10 += random_below(&random, 32) != 0 && settings->noise_Pa_q10 == 0;
   for (int k = 0; k < SENSORS_MOST && random_below(&random, 8); k++) { /* of some sensors */
     settings->gain_sd_q16[k] = (uint16_t)(random_u32(&random) >> random_below(&random, 16));
-    settings->past_sd_Pa_q10[k] = (int32_t)(random_u32(&random) >> (3 + random_below(&random, 29)));
+    settings->hysteresis_sd_Pa_q10[k] = (int32_t)(random_u32(&random) >> (3 + random_below(&random, 29)));
   }
   settings->model_sd_q16 = (uint16_t)(random_u32(&random) >> random_below(&random, 32));
-  settings->cut_noises = random_below(&random, 2) ? 0 : (uint8_t)random_u32(&random);
+  settings->clip_below_sds = random_below(&random, 2) ? 0 : (uint8_t)random_u32(&random);
   if (random_below(&random, 4) == 0) {
     bool any = random_below(&random, 2);
     settings->dip_share = any ? any_float(&random) : (float)random_between(&random, 0.0, 0.1);
@@ -395,7 +395,7 @@ static void fit_any(uint32_t number, const struct input *input, bool begins) {
   struct fit_result fit;
   struct fit_settings *settings = &tip.settings;
   *settings = input->settings;
-  settings->cut_noises = 0;
+  settings->clip_below_sds = 0;
   settings->location_sd_limit_mm = 0.0f;
   void (*const plain[])(const struct fit_array *, const int32_t *, uint32_t, const struct fit_settings *,
                         struct fit_result *) = {fit_gaussian_grid, fit_gaussian_grid_plain, fit_gaussian_grid_small, fit_general};
@@ -406,7 +406,7 @@ static void fit_any(uint32_t number, const struct input *input, bool begins) {
   struct fit_outlier_state outliers = tip.outliers;
   fit_gaussian_grid_update(input->array, readings, input->usable, settings, &outliers, &fit);
   fit_gaussian_update(input->array, readings, input->usable, settings, &tip.outliers, &fit);
-  fit_bias_widen(&tip.bias, input->array, settings, &fit);
+  fit_bias_add(&tip.bias, input->array, settings, &fit);
   tip.fit = fit;
   tip.tangential.question = (struct tangential_question){begins, 0, tip.frame.t_us, readings, settings, &tip.fit};
   tangential_estimate(&tip.tangential);

@@ -59,10 +59,10 @@ TEST(test_low_signal_below_twenty_sigma) {
  * of the errors, alike for all kernels. */
 TEST(test_errors_spread_the_result_as_predicted) {
   struct random random = {101};
-  static const double past_sds[] = {0.0, 0.0, 0.02, 0.06};
+  static const double hysteresis_sds[] = {0.0, 0.0, 0.02, 0.06};
   for (int i = 0; i < 12; i++) {
     const int kernel = i % 3;
-    const double noise_Pa = i / 3 == 1 ? 20.0 : 1.0, gain_sd = i < 3 ? 0.02 : 0.0, past_sd = past_sds[i / 3];
+    const double noise_Pa = i / 3 == 1 ? 20.0 : 1.0, gain_sd = i < 3 ? 0.02 : 0.0, hysteresis_sd = hysteresis_sds[i / 3];
     struct fit_settings settings = {.iterations = 7, .noise_Pa_q10 = (int32_t)(1024.0 * noise_Pa)};
     uint32_t used = kernel == 1 ? ALL & ~(UINT32_C(1) << 4) : ALL;
     double squares = 0.0, predicted = 0.0, force = 0.0, force_predicted = 0.0;
@@ -74,11 +74,11 @@ TEST(test_errors_spread_the_result_as_predicted) {
       press.p0_Pa = i < 9 ? press.p0_Pa : 100000.0;
       for (int k = 0; k < SENSORS; k++) {
         double sd = k % 3 ? gain_sd : 0.0;
-        double past_Pa = k % 3 ? past_sd * press.p0_Pa : 0.0;
+        double hysteresis_Pa = k % 3 ? hysteresis_sd * press.p0_Pa : 0.0;
         settings.gain_sd_q16[k] = (uint16_t)(65536.0 * sd);
-        settings.past_sd_Pa_q10[k] = (int32_t)(1024.0 * past_Pa);
+        settings.hysteresis_sd_Pa_q10[k] = (int32_t)(1024.0 * hysteresis_Pa);
         readings[k] = to_q10((1.0 + sd * random_normal(&random)) * gaussian(&press, (double)x_mm[k], (double)y_mm[k]) +
-                             (i / 3 == 1 ? noise_Pa : past_Pa) * random_normal(&random));
+                             (i / 3 == 1 ? noise_Pa : hysteresis_Pa) * random_normal(&random));
       }
       (kernel == 2 ? fit_general : fit_gaussian)(&array, readings, used, &settings, &result);
       assert_finite_and_defined();

@@ -161,7 +161,7 @@ int main(void) {
   }
   for (int k = 0; k < FT_MAX_SENSORS; k++) { /* so little that it spoils no press */
     own[k] = (struct fit_deviation){12, -12, k % 2 ? 40 : -40};
-    chosen.past_sd_Pa_q10[k] = 1024 * k;
+    chosen.hysteresis_sd_Pa_q10[k] = 1024 * k;
   }
   for (;;) {
     CALL_DEBUGGER(CALL_NEXT_JOB);
