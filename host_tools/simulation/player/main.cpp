@@ -10,7 +10,7 @@
 #include "library/pad/profile.hpp"
 #include "library/pad/table_file.hpp"
 #include "simulation/player/native_fingertip.h"
-#include "simulation/player/repeat.h"
+#include "simulation/player/native_stages.h"
 #include "simulation/player/scenario.hpp"
 #include "tool/calibration/from_recording.hpp"
 #include "tool/plain_help.hpp"
@@ -26,6 +26,7 @@ extern "C" {
 #include <cstdio>
 #include <cstring>
 #include <functional>
+#include <memory>
 #include <optional>
 namespace fingertip {
 namespace {
@@ -255,17 +256,17 @@ public:
   void packet(const wire_packet &packet) {
     switch (packet.type) {
     case WIRE_INFO:
-      if (!begun_) {
-        begun_ = repeat_begin(&packet.body.info);
-        if (!begun_) {
+      if (!firmware_) {
+        firmware_.reset(native_stages_of(&packet.body.info));
+        if (!firmware_) {
           throw Error("the capture's info packet describes no array that this code can fit");
         }
       }
       break;
     case WIRE_ACK:
       if (packet.body.ack.result == WIRE_RESULT_DONE) {
-        if (packet.body.ack.command == WIRE_CMD_TARE) {
-          repeat_tare();
+        if (packet.body.ack.command == WIRE_CMD_TARE && firmware_) {
+          native_stages_tare(firmware_.get());
           tared_ = true;
         } else if (packet.body.ack.command == WIRE_CMD_SLIP || packet.body.ack.command == WIRE_CMD_OSR) {
           throw Error("settings change within the capture; make one without \"set\"");
@@ -284,7 +285,7 @@ public:
 
 private:
   void frame(const wire_packet &raw) {
-    if (!begun_ || !tared_) {
+    if (!tared_) {
       return; // what came before decides about the zero, and is not known
     }
     if (!contact_ || contact_->body.contact.frame != raw.body.raw.frame) {
@@ -296,7 +297,7 @@ private:
       return; // it shows what was found before the tare
     }
     wire_packet ours = *contact_;
-    repeat_frame(&raw, held, &ours.body.contact);
+    native_stages_repeat(firmware_.get(), &raw, held, &ours.body.contact);
     result_.frames++;
     result_.held += held;
     result_.in_contact += (contact_->body.contact.flags & CONTACT_FLAG_CONTACT) != 0;
@@ -316,7 +317,8 @@ private:
     }
   }
 
-  bool begun_ = false, tared_ = false;
+  std::unique_ptr<native_stages, void (*)(native_stages *)> firmware_{nullptr, native_stages_free};
+  bool tared_ = false;
   std::optional<std::uint32_t> lonely_frame_;
   std::optional<wire_packet> contact_;
   Repeated result_;

@@ -21,6 +21,14 @@ void native_stages_free(struct native_stages *all);
 void native_stages_frame(struct native_stages *all, uint64_t t_us, const int32_t *pressure_Pa_q10, int32_t noise_Pa_q10,
                          struct wire_packet *packet);
 
+/* The same of what a fingertip has sent. Its info packet has the layout, the settings, the calibration and the profile. NULL: that cannot
+ * be; the packet is not to be trusted. */
+struct native_stages *native_stages_of(const struct wire_info *info);
+/* A tare command was obeyed. */
+void native_stages_tare(struct native_stages *all);
+/* Fills in the contact packet to this raw packet; stages are left as they are. held: no new pressures came. */
+void native_stages_repeat(struct native_stages *all, const struct wire_packet *raw, bool held, struct wire_contact *contact);
+
 #ifdef __cplusplus
 }
 #endif
