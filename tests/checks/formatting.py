@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks that sources are formatted: C and C++ by clang-format, Python by ruff, JavaScript and TypeScript by biome.
 
-usage: formatting.py [ROOT] [--write] [--json FILE]
+usage: formatting.py [ROOT] [--write]
 
 It prints each file that its formatter would change, and exits with 1 if there is one. With --write it formats them. Generated files, whose
 first line says so, are left alone. Formatters that are not in PATH are looked for where cmake/bootstrap.sh puts them. One that is missing is
@@ -9,7 +9,6 @@ an error: exit 2.
 """
 
 import argparse
-import json
 import pathlib
 import shutil
 import subprocess
@@ -65,7 +64,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("root", nargs="?", default=".")
     parser.add_argument("--write", action="store_true", help="format the files")
-    parser.add_argument("--json", help="write the list of unformatted files to FILE")
     options = parser.parse_args()
     root = pathlib.Path(options.root).resolve()
     try:
@@ -75,10 +73,6 @@ def main():
     except MissingFormatter as error:
         print(error, file=sys.stderr)
         return 2
-    if options.json:
-        path = pathlib.Path(options.json)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps({"unformatted": found}, indent=1) + "\n", encoding="utf-8")
     for name in found:
         print(f"formatting.py: {name} is not formatted; run: tests/checks/formatting.py --write")
     return 1 if found else 0
