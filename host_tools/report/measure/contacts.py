@@ -139,14 +139,8 @@ class Contacts(Measure):
 
     def settings_of(self, pads, noise_Pa):
         """As the firmware has them where a profile is set, for each pad."""
-        return self.settings(
-            len(pads),
-            noise_Pa=noise_Pa,
-            gain_sd=pads["gain_sd"],
-            clip_below_sds=0,
-            dip_share=pads["dip_share"],
-            dip_sd_mm=pads["dip_sd_mm"],
-        )
+        of_pads = {name: pads[name] for name in ("gain_sd", "dip_share", "dip_sd_mm")}
+        return self.settings(len(pads), noise_Pa=noise_Pa, clip_below_sds=0, **of_pads)
 
     def own_of(self, pads):
         """None where no calibration has found any."""
