@@ -56,7 +56,7 @@ private:
 
 class Model {
 public:
-  enum class State { connecting, live, gone, replay };
+  enum class State { connecting, live, gone, replay, nothing_recorded };
 
   struct Location {
     std::uint64_t t_us;

@@ -16,6 +16,7 @@ StateText state_of(const Model &model, bool how_long) {
   case Model::State::connecting: return {"waiting for an answer", WARNING};
   case Model::State::gone: return {GONE_ADVICE, BAD};
   case Model::State::replay: return {"replay", ACCENT, true};
+  case Model::State::nothing_recorded: return {"nothing recorded", ACCENT, true};
   case Model::State::live: break;
   }
   if (model.is_without_sensors()) {

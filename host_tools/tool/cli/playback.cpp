@@ -87,10 +87,7 @@ Playback::Playback(const std::string &path, bool salvage, const std::string &dev
   }
   for (const std::string &each : devices) {
     tracks_.emplace_back(PacketFile(path, salvage, each, interval));
-    Model model;
-    model.set_state(Model::State::replay);
-    model.set_source(path);
-    models_.push_back(model);
+    models_.emplace_back().set_source(path);
   }
   if (grip_track_ && grip_track_->is_ended()) {
     grip_track_.reset(); /* a file without a gripper */
@@ -112,6 +109,10 @@ void Playback::step(HostTime now) {
   }
   if (grip_track_) {
     is_there_ = grip_track_->read_to(time_us_, PACKETS_AT_ONCE, grip_) && is_there_;
+  }
+  for (std::size_t i = 0; i < tracks_.size(); i++) {
+    const bool is_gap = is_there_ && std::isfinite(due_us()) && time_us_ > tracks_[i].last_us() + 1e6 * STALLED_s;
+    models_[i].set_state(is_gap ? Model::State::nothing_recorded : Model::State::replay);
   }
   if (const double next_us = due_us(); is_there_ && !paused_ && std::isfinite(next_us) && next_us > time_us_ + PAUSE_MOST_us) {
     time_us_ = next_us;

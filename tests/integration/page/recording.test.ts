@@ -21,7 +21,7 @@ function session(): DevicePacket[] {
   const [info, health, contact, raw] = ['info_grasp', 'health', 'contact_grasp', 'raw'].map(vector) as [Info, DevicePacket, Contact, Raw];
   const packets: DevicePacket[] = [info];
   for (let frame = 1; frame < 600; frame++) {
-    const t_us = 1_000_000 + 765 * frame - (frame > 400 ? 300_000 : 0);
+    const t_us = 1_000_000 + 765 * frame - (frame > 400 ? 300_000 : 0) + (frame > 500 ? 5_000_000 : 0);
     const x_mm = Math.fround(1.1 * frame);
     packets.push(
       ...(frame % 20 ? [{ ...contact, frame, t_us, x_mm }] : []),
@@ -87,12 +87,12 @@ test('what the page and the tool recorded is read back, packet by packet', async
 
 test('a replay keeps its pace, waits, skips and hands out everything', async (t) => {
   const replay = new Replay(new File([new Uint8Array(recorded('csv'))], 'own.csv') as unknown as globalThis.File);
-  let [now_ms, bytes, ended] = [0, 0, ''];
+  let [now_ms, bytes, ended, shown] = [0, 0, '', { silent_ms: NaN }];
   const ticks: (() => void)[] = [];
   t.mock.method(performance, 'now', () => now_ms);
   t.mock.method(globalThis, 'setTimeout', (tick: () => void) => ticks.push(tick));
   const receive = ({ length }: Uint8Array): void => void (bytes += length);
-  replay.onLine = (line) => void line.open(receive, (why) => (ended = why));
+  replay.onLine = (line) => void (line.open(receive, (why) => (ended = why)), (shown = line as typeof shown));
   const after = async (ms: number, change: Partial<Replay> = {}): Promise<string> => {
     Object.assign(replay, change);
     now_ms += ms;
@@ -107,6 +107,9 @@ test('a replay keeps its pace, waits, skips and hands out everything', async (t)
   assert.equal(await after(20, { paused: true }), '0.16');
   replay.skip(0.1);
   assert.equal(await after(0), '0.26');
+  replay.skip(1);
+  await after(0);
+  assert.equal(Math.round(shown.silent_ms / 100), 12); // it is at 1.26 s, and frame 500 was at 0.08 s
   replay.skip(10);
   await after(0);
   assert.deepEqual([ended, bytes], ['the replay has ended', frames(packets).length]);

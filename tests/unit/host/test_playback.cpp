@@ -8,7 +8,7 @@
 using namespace fingertip;
 using std::chrono::milliseconds;
 
-/* A minute at 50 frames a second, in which the device restarts after half of it. */
+/* A minute at 50 frames a second, in which the device restarts after half of it, two seconds after frame 1399. */
 class PlaybackTest : public ::testing::Test {
 protected:
   static constexpr std::uint32_t FRAMES = 3000;
@@ -19,7 +19,7 @@ protected:
     RecordingWriter writer(make_lines(path_, true, OutputFile::Appears::at_once), &info.body.info, 15, {}, true);
     std::uint16_t sequence = 0;
     for (std::uint32_t frame = 0; frame < FRAMES; frame++) {
-      std::uint64_t t_us = 5000 + std::uint64_t{20000} * (frame % (FRAMES / 2));
+      std::uint64_t t_us = 5000 + std::uint64_t{20000} * (frame % (FRAMES / 2) + (frame / 100 == 14 ? 100 : 0));
       writer.packet(test::make_contact(sequence++, t_us, frame));
       writer.packet(test::make_raw(sequence++, t_us, frame));
     }
@@ -53,6 +53,14 @@ TEST_F(PlaybackTest, KeepsTheRecordedPace) {
   Playback fast(path_, false, "", 10);
   pass(fast, milliseconds(1000));
   EXPECT_NEAR(frame_of(fast), 500, 10);
+}
+
+TEST_F(PlaybackTest, ShowsNothingWhereNothingWasRecorded) {
+  Playback playback(path_, false, "", 1);
+  for (const bool is_there : {true, false, true}) {
+    pass(playback, milliseconds(is_there ? 28000 : 1000));
+    EXPECT_EQ(playback.models()[0].is_current(), is_there);
+  }
 }
 
 TEST_F(PlaybackTest, SpacePausesAndGoesOn) {
@@ -103,9 +111,7 @@ TEST_F(PlaybackTest, SeeksToWhatPlayingShows) {
 
 TEST_F(PlaybackTest, EndsByItselfAndAsFastAsItCan) {
   Playback playback(path_, false, "", 0);
-  for (int i = 0; i < 100 && !playback.is_over(); i++) {
-    playback.step(now_);
-  }
+  settle(playback);
   EXPECT_TRUE(playback.is_over());
   EXPECT_EQ(playback.models()[0].frames(), FRAMES);
 }

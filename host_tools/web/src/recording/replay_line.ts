@@ -109,7 +109,12 @@ class ReplayLine implements Line {
   private closed: ((why: string) => void) | null = null;
   private sequence = 0;
   private ahead = 0;
+  private last_us = NaN;
 
+  /** How long nothing was recorded, where the replay is. */
+  get silent_ms(): number {
+    return (this.replay.now_us - this.last_us) / 1000;
+  }
   /** From its info packet; empty before. */
   serial = '';
 
@@ -137,7 +142,8 @@ class ReplayLine implements Line {
     return Promise.resolve();
   }
 
-  take({ packet, is_restarted }: Item): void {
+  take({ time_us, packet, is_restarted }: Item): void {
+    this.last_us = Number.isNaN(time_us) ? this.last_us : time_us;
     if (packet.type === PacketType.INFO) {
       this.serial = packet.serial;
     }
@@ -170,7 +176,7 @@ export class Replay {
   private readonly items: AsyncGenerator<Item, void, undefined>;
   private next: Item | null = null;
   private first_us = NaN;
-  private now_us = NaN;
+  now_us = NaN;
   private shown_ms = 0;
   private stopped = false;
 
@@ -261,6 +267,7 @@ export class Replay {
 
   private end(problem: string): void {
     this.stopped = true;
+    this.now_us = this.first_us + this.seconds * 1e6;
     this.lines.forEach((line) => line?.end(`the replay has ended${problem ? ' before the end of the file' : ''}`));
     this.onEnd(problem);
   }

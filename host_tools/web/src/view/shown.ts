@@ -103,15 +103,18 @@ export class Shown {
 
   /** Whether the newest frame's report still holds. now_ms: performance.now(). */
   isCurrent(now_ms: number): boolean {
-    const { is_replay, state, framed_ms, contacts, raws } = this.fingertip;
-    const reported = contacts + raws > 0;
-    return reported && (is_replay || (state === 'live' && now_ms - framed_ms < this.stalled_ms));
+    const { is_replay, state, contacts, raws } = this.fingertip;
+    return contacts + raws > 0 && (is_replay || state === 'live') && this.silentFor_ms(now_ms) < this.stalled_ms;
   }
 
   /** What is known of a moment of its history; of now, Infinity, nothing once the newest frame is old. */
   moment(t_s: number, now_ms: number): Moment {
     const { history } = this.fingertip;
     return history && (t_s < Infinity || this.isCurrent(now_ms)) ? momentAt(history, t_s, this.stalled_ms / 1000) : NOTHING_KNOWN;
+  }
+
+  private silentFor_ms(now_ms: number): number {
+    return (this.fingertip.line as { silent_ms?: number }).silent_ms ?? now_ms - this.fingertip.framed_ms;
   }
 
   /** Two frames at a rate that somebody has set. */
@@ -122,12 +125,13 @@ export class Shown {
 
   /** In words, and how much it matters. */
   state(now_ms: number): { words: string; level: Level } {
-    const { state, is_replay, why, framed_ms, health, history } = this.fingertip;
+    const { state, is_replay, why, health, history } = this.fingertip;
+    const silent_ms = this.silentFor_ms(now_ms);
     if (state === 'closed') {
       return { words: why || 'disconnected', level: is_replay ? 'plain' : 'bad' };
     }
     if (is_replay) {
-      return { words: 'replay', level: 'plain' };
+      return { words: silent_ms > this.stalled_ms ? 'nothing recorded' : 'replay', level: 'plain' };
     }
     if (state === 'opening') {
       return { words: 'waiting for an answer', level: 'warning' };
@@ -135,7 +139,6 @@ export class Shown {
     if (state === 'live' && health?.sensors_present === 0) {
       return { words: 'no sensor answers', level: 'bad' };
     }
-    const silent_ms = now_ms - framed_ms;
     if (silent_ms > this.stalled_ms) {
       return { words: `stalled for ${Math.floor(silent_ms / 1000)} s`, level: 'bad' };
     }
