@@ -11,6 +11,7 @@ import { Dialog } from './dialog';
 
 const SECONDS = 10;
 const VERDICTS = { ok: 'fine', warn: 'look', bad: 'wrong' };
+const BUTTONS: Record<string, string> = { flash: 'Flash', set: 'Settings', tare: 'Tare' }; // of the tool's commands
 
 export function examine(fingertip: Fingertip): void {
   const bar = element('progress', { max: SECONDS, 'aria-label': 'Measuring', hidden: true });
@@ -26,7 +27,8 @@ export function examine(fingertip: Fingertip): void {
       const findings = await findingsOf(fingertip, dialog, bar);
       for (const { verdict, check, text, advice } of findings) {
         const title = element('strong', {}, `${VERDICTS[verdict]}: ${check}`);
-        list.append(element('li', { class: verdict }, title, ` ${text}${advice ? `; ${advice}` : ''}`));
+        const here = advice.replace(/`fingertip (\w+)[^`]*`/g, (_, command: string) => `"${BUTTONS[command] ?? command}"`);
+        list.append(element('li', { class: verdict }, title, ` ${text}${here ? `; ${here}` : ''}`));
       }
       const wrong = findings.filter((finding) => finding.verdict !== 'ok').length;
       dialog.setMessage(wrong === 0 ? 'All is well.' : `${wrong} of ${findings.length} checks found something.`);
