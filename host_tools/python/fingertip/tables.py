@@ -5,7 +5,6 @@ import csv
 import dataclasses
 import datetime
 import math
-import pathlib
 import re
 import sys
 import warnings
@@ -22,7 +21,8 @@ NO_PRESSURE = re.compile(r"(t|x|y|z|f|q[xyz]?|time|temp[0-9]*|temperature[0-9]*|
 UNIT_NAMED = re.compile(rf"(?<![A-Za-z])({'|'.join(UNITS)})(?![A-Za-z])")
 SECONDS = {"milli": 1e-3, "m": 1e-3, "micro": 1e-6, "u": 1e-6, "\u00b5": 1e-6, "\u03bc": 1e-6, "\ufffd": 1e-6, "nano": 1e-9, "n": 1e-9}
 TIME_NAMED = re.compile(rf"(?<![a-z])({'|'.join(SECONDS)})s(?:ecs?|econds?)?(?![a-z])")
-CLOCK = re.compile(r"\d:\d|\d{4}-\d\d-\d\d")
+CLOCK = re.compile(r"\d:\d|\d{4}-\d\d-\d\d|\d\.\d+\.\d{4}")
+MOST_bytes = 1 << 29
 DECIMAL = re.compile(r"[-+]?\d*([.,])\d+(?:[eE][-+]?\d+)?")
 MISSING = ("", "na", "n/a", "#n/a", "null", "none", "-", "--")  # as programs write a cell that has no number
 
@@ -35,7 +35,9 @@ def _number(cell: str) -> float | None:
         return math.nan
     if not CLOCK.search(cell):
         return None
-    text = re.sub(r"[.,](\d+)", lambda found: f".{found[1][:6]:0<6}", cell).replace("Z", "+00:00")
+    text = re.sub(r"^(\d+)\.(\d+)\.(\d{4})", lambda found: f"{found[3]}-{found[2]:0>2}-{found[1]:0>2}", cell)
+    text = re.sub(r"(?<!\d)(\d):", r"0\1:", text).replace("Z", "+00:00")
+    text = re.sub(r"[.,](\d+)", lambda found: f".{found[1][:6]:0<6}", text)
     with contextlib.suppress(ValueError):
         moment = datetime.datetime.fromisoformat(text if "-" in text else f"1970-01-01 {text}")
         return (moment if moment.tzinfo else moment.replace(tzinfo=datetime.timezone.utc)).timestamp()
@@ -77,7 +79,7 @@ class _Table:
         is_first = not self.rows or (len(self.rows) == 1 and np.isfinite(self.rows[0]).sum() <= 1)  # a date, perhaps, above the table
         if len(values) < len(cells):
             text = printable(cells[numbers.index(None)][:40])
-            self.wrong = f'"{text}" is no number; leave the cell empty where there is none, or delete the line'
+            self.wrong = f'"{text}" is no number, nor a time as 2024-05-06 07:08:09; leave the cell empty, or delete the line'
             if not is_first or (numbers[0] is not None and np.isfinite(values).sum() > len(cells) / 2):
                 raise ValueError(self.wrong)
         if len(values) < len(cells) or (is_first and not np.isfinite(values).any()):
@@ -95,9 +97,12 @@ def read_numbers(path: str) -> tuple[list[str], FloatArray, set[int]]:
     """(names of the columns from the lines before the first row of numbers, rows, columns of dates or times of day, in seconds) of a text file with
     comma, semicolon, tab or blanks between cells. Raises InputError, which names the line."""
     try:
-        data = sys.stdin.buffer.read() if path == "-" else pathlib.Path(path).read_bytes()
+        with contextlib.nullcontext(sys.stdin.buffer) if path == "-" else open(path, "rb") as file:
+            data = file.read(MOST_bytes + 1)
     except OSError as error:
         raise InputError(f"{path}: {error.strerror}") from None
+    if len(data) > MOST_bytes:
+        raise InputError(f"{path}: more than {MOST_bytes // 10**6} MB; give a part of it")
     check_kind_of_file(path, data)
     lines = data.decode("utf-8-sig", "replace").splitlines()
     found = _Table()

@@ -276,7 +276,7 @@ class Fit(unittest.TestCase):
                 self.assertIn(f"fingertip fit: {(path + ': ') * refused}{words}", run("--pad", "2x4", *options, status=refused))
             pathlib.Path(path).write_text("\n".join(f"{1.7e9 + k / 1000!r},{line.split(',', 2)[2]}" for k, line in enumerate(lines)))
             self.assertIn("\n1700000000.029,", run("--pad", "2x4", "--unit", "kPa"))
-            for more, words in ((",1", ":2: 11 cells, and 10 before"), ("x", 'x" is no number; leave the cell empty')):
+            for more, words in ((",1", ":2: 11 cells, and 10 before"), ("x", 'x" is no number, nor a time as')):
                 pathlib.Path(path).write_text("\n".join([lines[0], lines[1] + more]))
                 self.assertIn(words, run(*right, status=1))
 
@@ -301,7 +301,8 @@ class Fit(unittest.TestCase):
             german.replace(";0,", ";,").replace("\n0,", "\n,"),
             "\n".join(",".join(row) + "," for row in rows).replace("nan", ""),
             joined(clock, first="Time (hh:mm:ss.ms)"),
-            joined([[row[0][11:], *row[1:]] for row in clock]),
+            joined([[row[0][12:], *row[1:]] for row in clock]),
+            joined([[f"6.5.2024 {row[0][12:]}", *row[1:]] for row in clock]),
         ):
             with self.subTest(text[:30]), tempfile.NamedTemporaryFile() as file:
                 pathlib.Path(file.name).write_text(text, encoding="utf-8", newline="")
@@ -309,6 +310,7 @@ class Fit(unittest.TestCase):
                 np.testing.assert_allclose(np.c_[time_s - time_s[0], pressures], wanted, rtol=0, atol=1e-6)
                 if "p0 [Pa]" in text:
                     self.assertWarnsRegex(UserWarning, "named as in Pa, and read as kPa", read_table, file.name, 8, None, None, "kPa")
+        self.assertRaisesRegex(fingertip.InputError, "more than 536 MB; give a part", read_table, "/dev/zero", 8, None, None, "Pa")
         for data, words in (
             (german.encode("utf-16"), "text in UTF-16"),
             (b"\x93NUMPY\1", "save them as CSV"),
