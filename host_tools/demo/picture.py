@@ -3,8 +3,7 @@
 
     picture.py RECORDING.csv -o FILE.png [--device SERIAL] [--at S] [--until S [--every S]] [--size COLUMNSxROWS] [--tool PATH]
 
-The picture in the README of the project is that of the first touch of the calibrated fingertip in the demo. Alone it is played by its own time,
-however slow the emulator was:
+The picture in the README of the project is that of the first touch of the calibrated fingertip in the demo:
 
     sh cmake/bootstrap.sh demo
     build/host/host_tools/tool/cli/fingertip convert build/demo/recording.csv build/demo/rubber.csv --device 000000000000B0BB

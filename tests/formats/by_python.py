@@ -21,7 +21,7 @@ KINDS = (
     ("holds several", "several"),
     ("no fingertip", "no such"),
     ("format .* is unknown", "other format"),
-    (r":1: no recording|no recording of a fingertip|no MCAP file|packed as|copied as text|UTF-16|mcap [a-z]+ FILE", "no recording"),
+    ("no recording|no MCAP file|packed as|as text|save (it|them) as|mcap [a-z]+ FILE", "no recording"),
     (r":\d+: |damaged|torn|no header line|missing", "damaged"),
 )
 

@@ -304,11 +304,12 @@ def cases_by_others(corpus, name, bag, devices):
         "topics_backwards": {"only": "contact|pressures", "order": lambda found: found[::-1], "chunk_size": 1, "enable_crcs": False},
         "contacts_alone": {"only": "contact"},
         "channels_late": {"order": lambda found: sorted(found, key=lambda each: "lines" in each[1].topic), "chunk_size": 1000},
+        "front_gone": {"order": lambda found: found[60:]},
         "others_alone": {"only": "wrench|place|diagnostics"},
         "lines_alone": {"only": "lines"},
     }.items():
         data = rewritten(corpus, bag, **how)
-        is_whole = not re.search("alone|topics_back|broken", what) and (name == "one_bag" or "topics" not in what)
+        is_whole = not re.search("alone|topics_back|broken|gone", what) and (name == "one_bag" or "topics" not in what)
         corpus.recording(f"{name}_{what}", data, "mcap", devices, f"{name}_whole", is_whole)
         corpus.recording(f"{name}_{what}_cut", data[: len(data) * 2 // 3], "mcap", devices, f"{name}_whole", False)
         if what == "topics_only":
@@ -573,6 +574,8 @@ def make(folder, convert):
     corpus.recording("many_bag_far_backwards", backwards, "mcap", ("BBBB",), "many_bag_whole")
     for path in sorted((ROOT / "tests/fuzz/corpus/mcap").iterdir()):
         corpus.recording(f"fuzz_{path.name}", fuzz_seed(path), "mcap", ("", "AAAA", "BBBB"))
+    for begin in (b"\xd0\xcf\x11\xe0", b"\x93NUMPY", b"MATLAB 5", b"\x89HDF", b"SQLite format 3"):
+        corpus.recording(f"begins_{begin.hex()}", begin + bytes(99))
     stream_cases(corpus)
     for name, values in SETTINGS.items():
         for value in values:

@@ -1,9 +1,6 @@
 #!/usr/bin/python3
-"""Several computers on one network, each with fingertips, as network namespaces of this one; and what reached a recorder.
-
-    hosts.py FAKE_DEVICE cuts SECONDS          the account of a recording with its mishaps, as JSON; needs root
-    hosts.py FAKE_DEVICE latency SECONDS       what the way over Zenoh costs at the highest rate, as JSON
-    hosts.py router ENDPOINT                   a router, until it is killed
+"""Several computers on one network, each with fingertips, as network namespaces of this one; and what reached a recorder. As a program, with an
+endpoint, it is a router until it is killed.
 
 The truth of cuts is a second terminal of each fingertip (fake_device's mirror), which gets the same bytes a moment before the first.
 """
@@ -29,7 +26,7 @@ from fingertip.files import read_recording, recorded_devices  # noqa: E402
 from fingertip.mcap_recording import McapLineReader  # noqa: E402
 from fingertip.network import Stamp, parts_of  # noqa: E402
 
-from nightly import busy_s, wait_for  # noqa: E402
+from nightly import busy_s, run, wait_for  # noqa: E402
 
 HOSTS, TIPS, RATE_Hz, FULL_RATE_Hz = 4, 4, 50, 1310
 UNPLUGGED = "F100"  # and back, after half of its frames
@@ -39,12 +36,6 @@ PORT = 7447
 
 def command(*words):
     return [sys.executable, str(PACKAGE), *map(str, words)]
-
-
-def system(*words):
-    done = subprocess.run(list(map(str, words)), check=False, capture_output=True, text=True)
-    if done.returncode != 0:
-        raise SystemExit(f"hosts.py: {' '.join(map(str, words))}: {done.stderr.strip()}")
 
 
 class Mirrors:
@@ -111,10 +102,10 @@ class Network:
 
     def _make(self):
         def ip(*words, of=self.name):
-            system("ip", "-n", of, *words)
+            run("ip", "-n", of, *words)
 
         for space in (self.name, *self.spaces):
-            system("ip", "netns", "add", space)
+            run("ip", "netns", "add", space)
             ip("link", "set", "lo", "up", of=space)
         ip("link", "add", "name", "switch0", "type", "bridge")
         ip("addr", "add", "10.77.0.1/24", "dev", "switch0")
@@ -130,7 +121,7 @@ class Network:
             subprocess.run(["ip", "netns", "del", space], check=False, capture_output=True)
 
     def link(self, host, state):
-        system("ip", "-n", self.name, "link", "set", f"v{host}", state)
+        run("ip", "-n", self.name, "link", "set", f"v{host}", state)
 
 
 def cuts(fake_device, seconds):
@@ -163,7 +154,7 @@ def cuts(fake_device, seconds):
         truth = Mirrors(mirrors)
 
         def router():
-            return start([sys.executable, __file__, "router", endpoint], network.name)
+            return start([sys.executable, __file__, endpoint], network.name)
 
         def bridge(host):
             own = [word for serial, port in ports.items() if serial.startswith(f"F1{host}") for word in ("--port", port)]
@@ -284,19 +275,12 @@ def latency(fake_device, seconds):
     }
 
 
-def router(endpoint):
+if __name__ == "__main__":
     import zenoh
 
     config = zenoh.Config()
     config.insert_json5("mode", '"router"')
-    config.insert_json5("listen/endpoints", json.dumps([endpoint]))
+    config.insert_json5("listen/endpoints", json.dumps(sys.argv[1:]))
     config.insert_json5("scouting/multicast/enabled", "false")
     with zenoh.open(config):
         signal.pause()
-
-
-if __name__ == "__main__":
-    if sys.argv[1] == "router":
-        router(sys.argv[2])
-    else:
-        print(json.dumps({"cuts": cuts, "latency": latency}[sys.argv[2]](sys.argv[1], int(sys.argv[3]))))

@@ -328,6 +328,10 @@ bool McapLineSource::next(Line &line) {
       if (first != waiting_.end() &&
           (is_ended_ || first->first <= std::max(number_ + 1, left_out_until_) || waiting_.size() > WAITING_MOST)) {
         const auto next = waiting_.extract(first);
+        if (number_ == 0 && next.key() > 1) {
+          throw Error(ErrorCode::unread_kind, path_ + ": the recording's first lines are not in it. What the topics alone hold: " +
+                                                  "mcap filter FILE -y '.*/(contact|pressures)' -o OUT");
+        }
         const std::uint64_t gap = next.key() > number_ + 1 ? next.key() - number_ - 1 : 0;
         number_ = std::max(number_, next.key());
         line = line_of(next.key(), next.mapped());

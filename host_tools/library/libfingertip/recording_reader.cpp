@@ -243,17 +243,20 @@ std::string format_of(const std::string &path, const std::string &line) {
 
 /* Throws Error for a file that may hold a recording, with what makes one of it that is read. */
 void refuse_others(const std::string &path, std::string_view start) {
+  constexpr const char *ARRAYS = "arrays of NumPy or MATLAB, no text; save them as CSV";
   constexpr const char *UTF_16 = "text in UTF-16, an editor's or a spreadsheet's; save it as UTF-8";
   constexpr std::pair<std::string_view, const char *> OTHERS[] = {
       {"\x28\xb5\x2f\xfd", "packed as a whole by zstd: unzstd FILE"},
       {"\x04\x22\x4d\x18", "packed as a whole by lz4: unlz4 FILE"},
       {"\x1f\x8b\x08", "packed as a whole by gzip: gunzip FILE"},
       {"BZh", "packed as a whole by bzip2: bunzip2 FILE"},
-      {"\xfd"
-       "7zXZ",
-       "packed as a whole by xz: unxz FILE"},
+      {"\3757zXZ", "packed as a whole by xz: unxz FILE"},
       {"\x89MCAP0", "an MCAP file that was copied as text; copy it again, as bytes"},
       {"PK\3\4", "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV"},
+      {"\xd0\xcf\x11\xe0", "a spreadsheet; save it as CSV"},
+      {"\x93NUMPY", ARRAYS},
+      {"MATLAB 5", ARRAYS},
+      {"\x89HDF", ARRAYS},
       {"SQLite format 3", "a bag of ROS 2 in SQLite; ros2 bag convert makes one in MCAP, packed as it is now"},
       {"\xff\xfe", UTF_16},
       {"\xfe\xff", UTF_16},
@@ -445,7 +448,7 @@ std::optional<std::uint32_t> RecordingReader::device_of(std::string_view number,
 
 void RecordingReader::read_comment(const std::string &text) {
   if (text.rfind(FIRST_WORDS, 0) == 0) {
-    throw Damage{"another recording begins; take the file apart there"};
+    throw Damage{"another recording begins; give each by itself"};
   }
   std::size_t colon = text.find(": ");
   if (colon == std::string::npos) {

@@ -46,8 +46,7 @@ class AsyncFingertip:
     """As Fingertip, whose arguments it takes, without ever holding up the event loop:
 
         async with AsyncFingertip() as fingertip:
-            async for frame in fingertip:
-                ...
+            async for frame in fingertip: ...
 
     sync is the Fingertip itself, whose health, statistics and clock are there at once.
     """

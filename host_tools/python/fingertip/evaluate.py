@@ -11,8 +11,7 @@ between the scenario's rows. Frames whose time falls between a row with and a ro
     force_rmse_N               root mean square error of the force
     force_mape_percent         median absolute percentage error, as in De Clercq et al., RA-L 2022, section IV.C
     force_mape_frames          only frames with a true force above 0.2 N count for it
-    tangential_frames          of the fitted ones, those with a tangential force; null, as what follows, unless the scenario has
-                               the true one and the recording has some
+    tangential_frames          of the fitted ones, those with a tangential force; null, as what follows, where there is none
     tangential_ratio_error_p50, tangential_ratio_error_p95      of tangential over normal force, as a vector
     tangential_direction_p90_deg     only frames with a true ratio above 0.1 count for it
     tangential_from_touch      frames whose load is what changed since the touch: their truth is taken as it is all the same
@@ -20,8 +19,7 @@ between the scenario's rows. Frames whose time falls between a row with and a ro
     slip_found, slip_missed    true slips of at least 50 ms with, without a SLIP frame between start and end + 0.1 s
     slip_delay_ms              of the found ones, from the start of the slip to the first SLIP frame
     slip_valid_lost            of these true slips, those with a frame without SLIP_VALID between start and end
-    slip_false                 SLIP frames outside of all true slips; a slip's end is widened by the slip window,
-                               the time that the measure covers
+    slip_false                 SLIP frames outside of all true slips; a slip's end is widened by the slip window
     total_us_median            from the first bus activity of a frame to its packet
     stages_sum_wrong           frames whose stages do not add up to their total
     dropped_packets, crc_errors, format_errors       as the recorder counted; null if it was killed

@@ -3,10 +3,8 @@
 Scenario (CSV, UTF-8): what the sensors measure over time, and the truth behind it: see host_tools/simulation/emulator/scenario.mjs. Without Qx_N
 and Qy_N there is no tangential force.
 
-Recording (CSV or MCAP): the packets of one fingertip or of several, one row per frame: see
-host_tools/library/libfingertip/RECORDING.md. Cells of a packet that did not come are empty, and those of a quantity whose flag is off (no
-fit, no x); NaN here. Of several it is read as the recording of one of them, with time_us, the recorder's clock. Of a grasp it also
-has the gripper's and the controller's rows, "# grip: ...": see host_tools/grasp/grip_row.hpp, read_grip.
+Recording (CSV or MCAP): host_tools/library/libfingertip/RECORDING.md. Empty cells are NaN here. Of several it is read as the recording of one of
+them, with time_us, the recorder's clock. Rows of a grasp, "# grip: ...": see host_tools/grasp/grip_row.hpp, read_grip.
 
 Run report (JSON): what the emulator measured; used are device_time_zero_s and warnings.
 
@@ -294,6 +292,7 @@ _OTHERS = {
     b"\x89MCAP0": "an MCAP file that was copied as text; copy it again, as bytes",
     b"PK\3\4": "packed as a ZIP archive: unzip FILE; a spreadsheet is to be saved as CSV",
     **dict.fromkeys((b"\x93NUMPY", b"MATLAB 5", b"\x89HDF"), "arrays of NumPy or MATLAB, no text; save them as CSV"),
+    b"\xd0\xcf\x11\xe0": "a spreadsheet; save it as CSV",
     b"SQLite format 3": "a bag of ROS 2 in SQLite; ros2 bag convert makes one in MCAP, packed as it is now",
     **dict.fromkeys((b"\xff\xfe", b"\xfe\xff", b"#\0", b"\0#"), "text in UTF-16, an editor's or a spreadsheet's; save it as UTF-8"),
 }
@@ -346,7 +345,7 @@ class _RecordingLines:
                     source = io.BytesIO("\n".join(restored(texts)).encode("utf-8", "surrogateescape"))
                 size, read, shown, number = os.fstat(file.fileno()).st_size, 0, 0, 1
                 while block := source.read(BLOCK_bytes):
-                    block += source.readline()
+                    block += source.readline(1 << 20)  # a longer line is torn
                     read += len(block)
                     if self.progress and size > WORTH_WAITING_bytes and read - shown > size // 100:
                         shown = read
@@ -518,7 +517,7 @@ class _Reading:
 
     def _comment(self, line: int, text: str) -> None:
         if text.startswith("# fingertip-recording "):
-            raise ValueError("another recording begins; take the file apart there")
+            raise ValueError("another recording begins; give each by itself")
         key, separator, value = text[1:].partition(": ")
         if not separator:
             if text.startswith(("#N/A,", "#VALUE!,", "#REF!,", "#NAME?,", "#NUM!,", "#DIV/0!,")):

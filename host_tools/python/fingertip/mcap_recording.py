@@ -339,6 +339,10 @@ class McapLineReader:
     def items(self) -> Iterator[Line | Contacts | Damaged | Skipped]:
         """The lines in their order, rows many at a time; what is damaged is among them, at its place."""
         for each in self._ordered():
+            number = min(each.numbers) if isinstance(each, Contacts) else each[0] if isinstance(each, tuple) else 0
+            if number > 1 and self._is_joint is None:
+                topics = "What the topics alone hold: mcap filter FILE -y '.*/(contact|pressures)' -o OUT"
+                raise InputError(f"{self.path}: the recording's first lines are not in it. {topics}")
             if isinstance(each, Contacts) and not self._has_header:
                 each = self._damaged(CONTACT_TYPE, ValueError("a row with no header line before it"))
             if isinstance(each, tuple) and not isinstance(each, Contacts):

@@ -6,10 +6,8 @@ number that is kept. status has each line with the number of the last packet tha
 
 A live subscriber may miss packets: they are sent with congestion control "drop", and what the network does not take in time is left out.
 All packets of a fingertip, of whatever key, are numbered in one row, so that a recorder sees what it misses; it asks for that again, which
-is reliable and blocks. Zenoh's own AdvancedSubscriber does not do, under one key either: it asks once, and where the network is cut again
-during the answer it takes for lost what the bridge still keeps; and it knows neither what the line lost, nor what was sent between two bridges,
-nor when a recording is complete. The sequence numbers of the line do not do: they wrap after 25 s at the highest rate, and `fingertip serve`
-has its own.
+is reliable and blocks. Zenoh's own AdvancedSubscriber asks only once, and the sequence numbers of the line wrap after 25 s at the highest
+rate.
 
 Needs the package eclipse-zenoh.
 """

@@ -6,8 +6,7 @@ ideal   ideal Gaussian presses (sigma 5.7 mm) of 0.5 to 20 N at random places of
 demo    taps of different force and place, two slips, a figure-eight stroke; 10 s
 wander  one contact of 5 N from 0.6 s to the end that never rests: every frame has something to fit
 
-The pressure is the Gaussian of De Clercq et al., RA-L 2022, eq. (2), and the force its integral, eq. (4): F = 2 pi p0 sigma^2. slip is 1
-while the contact moves faster than 10 mm/s. The same name, length and seed give the same bytes. The file format is described in files.py.
+The pressure is the Gaussian of De Clercq et al., RA-L 2022, eq. (2), and the force its integral, eq. (4). slip is 1 above 10 mm/s.
 """
 
 import numpy as np

@@ -5,10 +5,9 @@
  * (a chip reset drops the chip's alarms and keeps those of the world around it). The interface of a
  * scope (`nanos`, `micros`, `createAlarm`) is the one rp2040js expects of its clock.
  *
- * While the processor executes, time advances instruction by instruction: `cycleSource` supplies the
- * cycles executed since the last synchronisation. Alarms fire between instructions only, in the order of their
- * times; while one fires, `nanos` is the time it was set for, so what it does does not depend on the length of the
- * instruction before.
+ * While the processor executes, time advances instruction by instruction: `cycleSource` supplies the cycles executed since the last
+ * synchronisation. Alarms fire between instructions only, in the order of their times; while one fires, `nanos` is the time it was set for,
+ * so what it does does not depend on the length of the instruction before.
  */
 class Alarm {
   constructor(time, callback) {

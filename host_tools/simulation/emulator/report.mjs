@@ -1,9 +1,8 @@
 /**
  * What went wrong during a run.
  *
- * A failure ends the run at once (the chip would have misbehaved, or the firmware broke a rule of the
- * hardware); a warning is recorded and the run goes on. Either makes the process exit with 1. Equal
- * messages are recorded once, with a count.
+ * A failure ends the run at once (the chip would have misbehaved, or the firmware broke a rule of the hardware); a warning is recorded and
+ * the run goes on. Either makes the process exit with 1. Equal messages are recorded once, with a count.
  */
 export class Report {
   constructor(now_ns = () => 0) {

@@ -6,10 +6,9 @@
  *     t_s,contact,x_mm,y_mm,force_N,p0_Pa,sigma_mm,slip,s0_Pa,...,s14_Pa[,Qx_N,Qy_N][,temperature_degC]
  *     0,0,0,0,0,0,0,0,0,...
  *
- * Rows have strictly increasing t_s >= 0; s<k>_Pa is the pressure on sensor k above ambient, at most 1e7 Pa to
- * either side. The last line ends with a newline: a file without it was cut off and is refused. Between rows
- * everything is linear, before the first and after the last it holds. contact .. slip and Qx_N, Qy_N are the
- * truth to judge the answer by, and are not used here. Time 0 is power-on.
+ * Rows have strictly increasing t_s >= 0; s<k>_Pa is the pressure on sensor k above ambient, at most 1e7 Pa to either side. The last line
+ * ends with a newline: a file without it was cut off and is refused. Between rows everything is linear, before the first and after the last
+ * it holds. contact .. slip and Qx_N, Qy_N are the truth to judge the answer by, and are not used here. Time 0 is power-on.
  */
 import { InputError, readText } from './errors.mjs';
 

@@ -2,8 +2,7 @@
  * Puts the page together: what finds fingertips, what shows them, what can be done with them.
  *
  * Programs in the console, and tests, may read `fingertip`:
- *   fingertips  those of the page (src/model/fingertip.ts): state, why, info, health, contacts, raws,
- *               lost, contact, raw, history, ...
+ *   fingertips  those of the page (src/model/fingertip.ts): state, why, info, health, history, ...
  *   pictures    drawn since the page was loaded
  *   ready_ms    performance.now() when the first was drawn; 0 before
  */

@@ -1,5 +1,4 @@
-// What happens to the simulated pad: an object that a hand presses and drags, that falls on it and
-// lies there, or that a grip holds while a load pulls.
+// What happens to the simulated pad: an object that a hand presses and drags, that falls on it, or that a grip holds while a load pulls.
 //
 // The pad: silicone of 12 mm without ends; objects are known from the twin's tables (objects.hpp), sensors' errors are its too
 // (twin/effects.hpp). An object touches where its middle is within the pad, 30 by 50 mm on 3 x 5 sensors; beyond, it has fallen off.
@@ -7,17 +6,14 @@
 // Friction is that of the simulated cell (bundle.hpp): Coulomb's, static then kinetic, with the rubber's give before all slides, which is 1
 // N/mm for each millimetre of contact radius. The middle of the contact goes along with the object. Objects do not turn, roll or tilt.
 //
-//   press   the hand holds the object rigidly. Its place and force follow what is asked within
-//           FOLLOWS_s, so that a pointer's events make no jumps. What the hand does first is a new
-//           contact: nothing pulls.
+//   press   the hand holds the object rigidly. Its place and force follow what is asked within FOLLOWS_s. A new contact has no pull.
 //   drop    from DROP_mm: m z'' = F - m g, F that of the table at its depth, times 1 + LOSS_s_mm z'
 //           while it goes deeper (Hunt and Crossley, J. Appl. Mech. 42, 1975). It bounces, and
 //           lies.
 //   hold    as press, but along the pad the object is free: m x'' = load - Q, where the load follows what is
 //           asked within LOAD_FOLLOWS_s. One that slid off stays lost until it is lifted, pressed or dropped.
 //
-// Time goes on in steps of STEP_s; between them readings are linear. Deterministic: the same calls
-// at the same times give the same bits. Some 25 us a millisecond while something touches.
+// Time goes on in steps of STEP_s; between them readings are linear. The same calls at the same times give the same bits.
 #pragma once
 
 #include "simulation/twin/effects.hpp"

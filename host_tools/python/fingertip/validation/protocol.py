@@ -11,8 +11,7 @@ A validation's recording is a usual recording of one fingertip. The steps are it
     # event: validate: pull toward_deg=90 weight_g=100 height_mm=2    before each pull
     # event: validate: end
 
-A pull: a thread at the weight's foot runs level over a pulley, and another weight hangs on it. (A tilted pad would need no thread. But a
-weight on a slope presses below its centre of mass, millimetres from its foot, so the location of the contact would not be known.)
+A pull: a thread at the weight's foot runs level over a pulley, and another weight hangs on it.
 """
 
 import math

@@ -1,9 +1,8 @@
 /**
  * One I2C bus: wired-AND lines, the targets on it, and a log of its transfers.
  *
- * A controller block drives whole bytes (start, writeByte, readByte, stop). GPIO may pull the lines as well
- * (`drive`), which is how firmware frees a stuck bus: clocks, START and STOP made by hand reach the targets,
- * data bits made by hand do not.
+ * A controller block drives whole bytes (start, writeByte, readByte, stop). GPIO may pull the lines as well (`drive`), which is how
+ * firmware frees a stuck bus: clocks, START and STOP made by hand reach the targets, data bits made by hand do not.
  *
  * A target implements start(), write(byte) -> acknowledged, read() -> byte or null when it does not drive,
  * readAcknowledged(bool), stop(), clock() for a bare SCL pulse, and holdsSda.

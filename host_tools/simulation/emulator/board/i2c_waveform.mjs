@@ -1,7 +1,6 @@
 /**
- * SDA and SCL as they look while an I2C block drives a bus whose model knows whole bytes: drawn from the block's
- * counts (`timing`: low_ns, high_ns, hold_ns), each byte when it is over. Between transfers the lines are what GPIO
- * and stuck targets make them.
+ * SDA and SCL as they look while an I2C block drives a bus whose model knows whole bytes: drawn from the block's counts (`timing`: low_ns,
+ * high_ns, hold_ns), each byte when it is over. Between transfers the lines are what GPIO and stuck targets make them.
  */
 export const WAVEFORM_SDA = 1;
 export const WAVEFORM_SCL = 2;

@@ -1,9 +1,8 @@
 /**
  * TCA9548A eight-channel I2C switch (Texas Instruments SCPS207).
  *
- * One control byte, bit n connects channel n, any mix at once; the byte takes effect at the STOP. A low RESET
- * disconnects every channel. Reading gives the control byte. What is behind a connected channel takes part in
- * every transfer.
+ * One control byte, bit n connects channel n, any mix at once; the byte takes effect at the STOP. A low RESET disconnects every channel.
+ * Reading gives the control byte. What is behind a connected channel takes part in every transfer.
  */
 import { I2cTarget } from './i2c_bus.mjs';
 

@@ -1,10 +1,9 @@
 /**
  * DMA controller of the RP2040 (datasheet 2.5): twelve channels, paced by the requests of the PIO blocks or by none.
  *
- * Pacing is by credits: a channel may have as many transfers under way as its peripheral has room or data for. One
- * transfer is issued per cycle of clk_sys over all channels, round robin. A read ends two cycles
- * after its issue, the write two after the read; an APB peripheral takes two more. Competition with the processor for
- * one memory bank is not modelled. A channel is complete when its last write ends.
+ * Pacing is by credits: a channel may have as many transfers under way as its peripheral has room or data for. One transfer is issued per
+ * cycle of clk_sys over all channels, round robin. A read ends two cycles after its issue, the write two after the read; an APB peripheral
+ * takes two more. Competition with the processor for one memory bank is not modelled. A channel is complete when its last write ends.
  *
  * Modelled is what the firmware uses: whole words, rings of the address written, chains, the first interrupt. Everything
  * else fails the run: other requests than those of state machines 0, registers that abort, trigger or reload in other

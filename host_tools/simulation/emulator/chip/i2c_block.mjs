@@ -1,10 +1,9 @@
 /**
  * I2C block of the RP2040 (DW_apb_i2c as its datasheet describes it in 4.3), controller mode, 7-bit addresses.
  *
- * Bus time comes from the count registers: SCL low for LCNT + 1 cycles of clk_sys, high for HCNT + SPKLEN + 7,
- * plus the board's rise time. A transfer advances byte by byte; the byte's effect on the bus happens at the
- * end of its ninth clock. The block talks to a bus object: start(), stop(), writeByte(byte) -> acknowledged,
- * readByte(acknowledge) -> byte, sdaLow, sclLow, onReleased, problem(), rise_ns.
+ * Bus time comes from the count registers: SCL low for LCNT + 1 cycles of clk_sys, high for HCNT + SPKLEN + 7, plus the board's rise time.
+ * A transfer advances byte by byte; the byte's effect on the bus happens at the end of its ninth clock. The block talks to a bus object:
+ * start(), stop(), writeByte(byte) -> acknowledged, readByte(acknowledge) -> byte, sdaLow, sclLow, onReleased, problem(), rise_ns.
  *
  * Modelled is what the firmware uses: fast mode, transfers in one direction up to a STOP, the interrupts TX_ABRT and STOP_DET.
  * Fails the run: everything else, configuration written while enabled, FIFO overflow and underflow, counts below their

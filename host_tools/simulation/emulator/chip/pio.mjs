@@ -1,17 +1,15 @@
 /**
  * PIO block of the RP2040 (datasheet chapter 3), in lock-step with emulated time: what the boards' programs use.
  *
- * The state machine runs at the edges of clk_sys that its divider lets through: what it does in a cycle shows at the
- * edge that ends the cycle. Only edges at which something happens are visited: a stalled machine, or one that counts
- * down a delay, costs nothing until data or a pin that it waits for changes. Inputs pass two flip-flops: an instruction
- * sees a pin as it was two cycles before its edge.
+ * The state machine runs at the edges of clk_sys that its divider lets through: what it does in a cycle shows at the edge that ends the
+ * cycle. Only edges at which something happens are visited: a stalled machine, or one that counts down a delay, costs nothing until data or
+ * a pin that it waits for changes. Inputs pass two flip-flops: an instruction sees a pin as it was two cycles before its edge.
  *
  * The first cycle of a divider is the one after its restart. Autopull refills in cycles of an enabled machine only. An
  * instruction written to INSTR takes the next cycle of clk_sys.
  *
- * Modelled: state machine 0; JMP always, X--, Y-- and PIN; WAIT PIN; IN PINS and OUT PINDIRS, to the right; PUSH
- * NOBLOCK; MOV PINS, NULL and MOV ISR, !Y; SET X and Y; whole dividers, autopush and autopull of whole words, a joined
- * receive FIFO. Everything else fails the run.
+ * Modelled: state machine 0; JMP always, X--, Y-- and PIN; WAIT PIN; IN PINS and OUT PINDIRS, to the right; PUSH NOBLOCK; MOV PINS, NULL
+ * and MOV ISR, !Y; SET X and Y; whole dividers, autopush and autopull of whole words, a joined receive FIFO. Everything else fails the run.
  * Warns: a transmit FIFO written while full, a receive FIFO read while empty.
  */
 import { arrayAt, field, RegisterBlock } from './registers.mjs';

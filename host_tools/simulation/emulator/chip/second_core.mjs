@@ -1,19 +1,16 @@
 /**
  * The RP2040's second Cortex-M0+ (RP2040 datasheet 2.2, 2.3.1, 2.8.2), beside a first one that owns the time.
  *
- * After a reset it waits in the boot ROM until core 0 has sent 0, 0, 1, vector table, stack pointer and entry through the
- * FIFO of the SIO. It answers each word with the same word. A 0 begins again. That part of the boot ROM is played here; what
- * it leaves behind is the boot ROM's: a read of the empty FIFO is noted (ROE), a 0 is sent unasked, an event is kept. Bit 16 of PSM FRCE_OFF
- * is its reset.
+ * After a reset it waits in the boot ROM until core 0 has sent 0, 0, 1, vector table, stack pointer and entry through the FIFO of the SIO.
+ * It answers each word with the same word. A 0 begins again. That part of the boot ROM is played here; what it leaves behind is the boot
+ * ROM's: a read of the empty FIFO is noted (ROE), a 0 is sent unasked, an event is kept. Bit 16 of PSM FRCE_OFF is its reset.
  *
- * Both cores share memory, peripherals, spin locks and events (SEV). Each has its own registers, MPU, SCR, divider,
- * interpolators, FIFO flags, and FIFO interrupt. No other interrupt and no SysTick of core 1 is modelled: to enable one fails
- * the run.
+ * Both cores share memory, peripherals, spin locks and events (SEV). Each has its own registers, MPU, SCR, divider, interpolators, FIFO
+ * flags, and FIFO interrupt. No other interrupt and no SysTick of core 1 is modelled: to enable one fails the run.
  *
- * Bounds of the timing. While both run, they take turns of 1 to TURN_CYCLES cycles. `seed` draws the turns, so that it varies
- * who comes first, as it does between two chips. What one does, the other sees at most one turn late or early. Neither waits
- * for the other at the bus: a chip adds a cycle where both want the same bank of SRAM or the same peripheral. The boot ROM
- * answers a word after ANSWER_CYCLES.
+ * Bounds of the timing. While both run, they take turns of 1 to TURN_CYCLES cycles. `seed` draws the turns, so that it varies who comes
+ * first, as it does between two chips. What one does, the other sees at most one turn late or early. Neither waits for the other at the
+ * bus: a chip adds a cycle where both want the same bank of SRAM or the same peripheral. The boot ROM answers a word after ANSWER_CYCLES.
  */
 import { Prng } from '../prng.mjs';
 import { StrictCore } from './core.mjs';

@@ -1,9 +1,8 @@
 /**
  * The XIP serial interface (DW_apb_ssi, RP2040 datasheet 4.10) with the flash of flash_memory.mjs behind it.
  *
- * Modelled: eight-bit full-duplex transfers through 16-deep FIFOs with bus time, chip select (automatic while
- * the transmit FIFO holds data, or forced through IO_QSPI), and whether execute-in-place works with the present
- * settings and the flash as it is.
+ * Modelled: eight-bit full-duplex transfers through 16-deep FIFOs with bus time, chip select (automatic while the transmit FIFO holds data,
+ * or forced through IO_QSPI), and whether execute-in-place works with the present settings and the flash as it is.
  */
 import { checkedField, RegisterBlock } from './registers.mjs';
 

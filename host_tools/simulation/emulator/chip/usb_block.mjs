@@ -2,11 +2,10 @@
  * USB controller of the RP2040 in device mode (datasheet 4.1), seen from both sides: registers and DPRAM for the
  * firmware, tokens for a host (`busReset`, `sof`, `setup`, `inToken`, `outData`).
  *
- * Fails the run on what hardware would punish: AVAILABLE set in the same write as other fields of a buffer
- * control register or less than one 48 MHz cycle later, a buffer touched while the controller owns it (unless
- * aborted; before revision B2, where an abort blocks the controller (erratum E2), unless AVAILABLE was cleared alone and
- * no packet is under way), buffers not 64-byte aligned, wrong data PID, pull-up without VBUS, PHY, clock or controller,
- * and tokens or frames while clk_sys is slower than clk_usb.
+ * Fails the run on what hardware would punish: AVAILABLE set in the same write as other fields of a buffer control register or less than
+ * one 48 MHz cycle later, a buffer touched while the controller owns it (unless aborted; before revision B2, where an abort blocks the
+ * controller (erratum E2), unless AVAILABLE was cleared alone and no packet is under way), buffers not 64-byte aligned, wrong data PID,
+ * pull-up without VBUS, PHY, clock or controller, and tokens or frames while clk_sys is slower than clk_usb.
  */
 import { clearedByOnes, field, RegisterBlock } from './registers.mjs';
 

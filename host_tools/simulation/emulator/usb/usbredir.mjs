@@ -240,9 +240,8 @@ export class UsbRedirServer {
   }
 
   /**
-   * A packet lies ready that the virtual machine does not ask for. On a busy computer that is for want of processor
-   * time, which a real host has: emulated time then waits, two seconds on the wall. After that the host is taken for one
-   * that does not read.
+   * A packet lies ready that the virtual machine does not ask for. On a busy computer that is for want of processor time, which a real host
+   * has: emulated time then waits, two seconds on the wall. After that the host is taken for one that does not read.
    */
   waitsForReader(now_ms) {
     if (!this.connected || !this.host.hasUnasked) {
