@@ -64,7 +64,7 @@ class Board:
         ends = lambda track: (*at(track, "start"), *at(track, "end"), *numbers(track, "width"))
         self.tracks = [(*ends(track), nets[track["net"][0][""][0]], *track["layer"][0][""]) for track in tree["segment"]]
         self.vias = [at(via, "at") for via in tree["via"]]
-        ((self.outline),) = [(at(line, "start"), at(line, "end")) for line in tree["gr_rect"]]
+        self.outline = next(((at(line, "start"), at(line, "end")) for line in tree["gr_rect"]), None)
 
     def place(self, node, name):
         x, y, *_ = numbers(node, name)
