@@ -134,6 +134,28 @@ TEST(Grip, ASlideThatSlowsDownIsNotPursued) {
   EXPECT_LT(world.report.wanted_N, 0.9 * expected_N);
 }
 
+// In the trough of a carrying motion the grip does not loosen.
+TEST(Grip, ALoadOfTheLastSecondMayReturn) {
+  GripWorld world;
+  world.carry(3.0, 0.3, 1.0);
+  const double held_N = world.force_N;
+  world.pull(1.0, 0.15);
+  world.run(0.15);
+  EXPECT_GT(world.force_N, 0.85 * held_N);
+}
+
+// Without a fit nothing repeats.
+TEST(Grip, FrozenAreTheSameValuesOfAFit) {
+  for (const bool is_fitted : {true, false}) {
+    GripWorld world;
+    world.grasp();
+    world.frozen[0] = true;
+    world.drop_flags[0] = is_fitted ? 0u : std::uint32_t{CONTACT_FLAG_FIT_VALID};
+    world.run(0.05);
+    EXPECT_EQ((world.report.trouble & GRIP_FINGER_0_FROZEN) != 0, is_fitted);
+  }
+}
+
 // Squeezed rubber moves a contact by less than a millimetre, far below what it holds.
 TEST(Grip, AShortMotionFarBelowWhatHoldsIsNoSlide) {
   GripWorld world;
