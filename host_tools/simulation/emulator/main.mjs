@@ -44,10 +44,10 @@ Runs an unmodified firmware image on an emulated board with simulated sensors an
   --stepped            serve the CDC port on stdin and stdout to a program that has a clock of its own: emulated time
                        passes only as far as that program asks (frames: port/stepped_port.mjs). So a test and its
                        emulators share one time, however slow the machine is: tests/support/emulated_fingertip.py
-  --usbredir WHERE     give the USB device to a virtual machine instead of the built-in host; WHERE is the path of a
-                       Unix socket or a TCP port on the loopback. QEMU: -chardev socket,id=r,path=WHERE,reconnect=1
-                       -device qemu-xhci -device usb-redir,chardev=r. Lines on stdin: "unplug", "plug". While a packet
-                       lies ready that the machine does not ask for, emulated time waits, 2 s at most
+  --usbredir PATH      give the USB device to a virtual machine instead of the built-in host, by a Unix socket. QEMU:
+                       -chardev socket,id=r,path=PATH,reconnect=1 -device qemu-xhci -device usb-redir,chardev=r.
+                       Lines on stdin: "unplug", "plug". While a packet lies ready that the machine does not ask for,
+                       emulated time waits, 2 s at most
   --sync-strobe MS     drive the sync pin: high for a millisecond at each multiple of MS, 2 to 60000; since power-on, with
                        --stepped on the clock of the program, so that several emulators are on one wire
   --host-script FILE   with the built-in host: lines "TIME_S HEXBYTES", "TIME_S dtr 0|1", "TIME_S baud N", comments "#"

@@ -1,8 +1,8 @@
 /** The usbredir server against the protocol's sizes and a scripted virtual machine. */
 import assert from 'node:assert/strict';
 import { once } from 'node:events';
-import { existsSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
-import { connect, createServer } from 'node:net';
+import { existsSync, mkdtempSync, rmSync } from 'node:fs';
+import { connect } from 'node:net';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, test } from 'node:test';
@@ -56,8 +56,8 @@ test('a message may come in any pieces; a first message that is no hello is refu
   assert.throws(() => new MessageReader(() => {}).take(encodeMessage(3, 7n)));
 });
 
-/** Runs `script(vm)` against the echo device of cdc.h behind a server; what is warned of matches. */
-async function session(script, warnings = /^$/) {
+/** Runs `script(vm)` against the echo device of cdc.h behind a server. */
+async function session(script) {
   const path = join(folder, 'usb.sock');
   const server = await UsbRedirServer.start(path);
   const packets = [];
@@ -116,7 +116,7 @@ async function session(script, warnings = /^$/) {
     socket.write(hello);
     for (const type of [4, 5, 1]) await vm.expect(type, 0n);
     await script(vm);
-    assert.match(machine.result.warnings.join('\n'), warnings);
+    assert.deepEqual(machine.result.warnings, []);
   } finally {
     socket.destroy();
     await server.stop();
@@ -140,16 +140,6 @@ test('a device connects once it is enumerated; requests, data and stalls go thro
     const told = answers.map((a) => `${a.id} ${a.payload[1]} ${a.payload.readUInt16LE(2)} ${a.payload.subarray(10)}`);
     assert.deepEqual(told, ['6 0 3 ', '5 0 3 abc']);
   }));
-
-for (const [type, length] of Object.entries({ 100: 3, 101: 9, 6: 0, 8: 1 })) {
-  test(`a message of type ${type} and ${length} bytes is too short: it ends the connection and not the machine`, () =>
-    session(async (vm) => {
-      vm.send(Number(type), 1n, Buffer.alloc(length));
-      await vm.quiet();
-      assert.ok(vm.socket.closed);
-      assert.equal(vm.machine.endReason ?? null, null);
-    }, /^.*: message of type \d+ and \d+ bytes$/));
-}
 
 test('a cancelled read is answered once and takes no data', () =>
   session(async (vm) => {
@@ -191,20 +181,6 @@ test('a pulled cable ends every transfer without an answer; pushed in, the devic
     vm.server.setPlugged(true);
     for (const type of [4, 5, 1]) await vm.expect(type, 0n);
   }));
-
-test('a path that something else holds is refused in words', async () => {
-  const file = join(folder, 'file');
-  writeFileSync(file, '');
-  await assert.rejects(UsbRedirServer.start(file), /exists and is no socket/);
-  const taken = join(folder, 'taken.sock');
-  const other = createServer(() => {});
-  await new Promise((resolve) => {
-    other.listen(taken, resolve);
-  });
-  await assert.rejects(UsbRedirServer.start(taken), /another emulator serves it/);
-  other.close();
-  await assert.rejects(UsbRedirServer.start(join(folder, 'nowhere', 'a.sock')), /cannot listen \(/);
-});
 
 test('emulated time waits two seconds for a reader that is late, never for what it has asked for', () =>
   session(async (vm) => {
