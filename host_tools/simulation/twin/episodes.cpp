@@ -4,11 +4,11 @@
 
 namespace fingertip::twin {
 
-Stage::Stage(const ScenarioOptions &scenario_options, const ContactTable &contact_table)
+ScenarioBuilder::ScenarioBuilder(const ScenarioOptions &scenario_options, const ContactTable &contact_table)
     : options(scenario_options), table(contact_table), forces(options.forces), tangential(options.tangential),
       friction("--friction", options.friction), mass_kg("--mass", options.mass_kg.empty() ? "0" : options.mass_kg) {}
 
-bool Stage::add(Episode episode) {
+bool ScenarioBuilder::add(Episode episode) {
   const double length_s = episode.phases.back().end_s;
   if (t_s_ + length_s + options.quiet_s > *options.seconds + 1e-9) {
     return false;
@@ -24,7 +24,7 @@ bool Stage::add(Episode episode) {
   return true;
 }
 
-Place Stage::random_place(Random &random) const {
+Place ScenarioBuilder::random_place(Random &random) const {
   const double at_x = random.uniform(-half_x_mm(), half_x_mm());
   return {at_x, random.uniform(-half_y_mm(), half_y_mm())};
 }

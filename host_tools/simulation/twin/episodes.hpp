@@ -1,4 +1,4 @@
-// The parts of scenarios: the stage on which episodes follow each other, and the episodes of each
+// The parts of scenarios: the builder that puts episodes one after the other, and the episodes of each
 // kind. pulled_episodes.cpp has those with a tangential force, scenarios.cpp the others.
 #pragma once
 
@@ -44,10 +44,10 @@ enum Stream : std::uint64_t {
 
 inline double milliseconds(double seconds) { return 1e-3 * std::round(1e3 * seconds); }
 
-// Puts episodes one after the other.
-class Stage {
+// Puts episodes one after the other: a scenario.
+class ScenarioBuilder {
 public:
-  Stage(const ScenarioOptions &scenario_options, const ContactTable &contact_table);
+  ScenarioBuilder(const ScenarioOptions &scenario_options, const ContactTable &contact_table);
 
   // The episode's times count from its beginning; false, and the scenario is full, if it does not fit.
   bool add(Episode episode);
@@ -85,14 +85,14 @@ void release(Episode &episode, Track &track, double ramp_s = TOUCHES_s);
 void rest_and_release(Episode &episode, Track &track, double rest_s);
 
 // The functions below make the nth episode of a kind.
-Episode lift(const Stage &stage, std::size_t n);
-Episode drag(const Stage &stage, std::size_t n);
-Episode slide(const Stage &stage, std::size_t n);
-Episode screw(const Stage &stage, std::size_t n);
+Episode lift(const ScenarioBuilder &builder, std::size_t n);
+Episode drag(const ScenarioBuilder &builder, std::size_t n);
+Episode slide(const ScenarioBuilder &builder, std::size_t n);
+Episode screw(const ScenarioBuilder &builder, std::size_t n);
 // The strongest grip of any slide of an object that is at most so heavy and at least so rough, but for --force itself.
 double slide_force_N(double mass_kg, double friction, double kinetic_share);
 
 // Gives the nth episode of a kind that is not about pulling the tangential force that the options ask for.
-void pull(Episode &episode, const Stage &stage, std::size_t n);
+void add_tangential_load(Episode &episode, const ScenarioBuilder &builder, std::size_t n);
 
 } // namespace fingertip::twin

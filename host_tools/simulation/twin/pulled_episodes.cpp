@@ -15,62 +15,62 @@ constexpr std::array<double, 1> DRAG_SPEEDS_mm_s{10};
 constexpr double GRAVITY_m_s2 = 9.81;
 
 // What pulls in the nth episode, as far as the options leave it open.
-struct Pulling {
+struct ChosenLoad {
   double angle_rad, share, friction;
 };
 
-Pulling pulling(const Stage &stage, std::size_t n) {
-  Random random(stage.options.seed, DIRECTION, n);
+ChosenLoad choose_load(const ScenarioBuilder &builder, std::size_t n) {
+  Random random(builder.options.seed, DIRECTION, n);
   const double angle_deg = random.uniform(-180.0, 180.0);
-  const double share = stage.tangential.share.at(random.uniform(0.0, 1.0));
-  const double friction = stage.friction.at(random.uniform(0.0, 1.0));
-  return {stage.tangential.angle_deg.value_or(angle_deg) * DEGREE, share, friction};
+  const double share = builder.tangential.share.at(random.uniform(0.0, 1.0));
+  const double friction = builder.friction.at(random.uniform(0.0, 1.0));
+  return {builder.tangential.angle_deg.value_or(angle_deg) * DEGREE, share, friction};
 }
 
 void aim(Track &track, double angle_rad) {
-  track.along_x = track.pull.along_x = std::cos(angle_rad);
-  track.along_y = track.pull.along_y = std::sin(angle_rad);
+  track.along_x = track.tangential.along_x = std::cos(angle_rad);
+  track.along_y = track.tangential.along_y = std::sin(angle_rad);
 }
 
 // Where a way along the track begins, so that all of it is where random places are; in the middle if it is longer.
-void place_way(Track &track, double way_mm, const Stage &stage, Random &random) {
+void place_way(Track &track, double way_mm, const ScenarioBuilder &builder, Random &random) {
   const auto begin = [&](double half_mm, double along_mm) {
     const double middle_mm = std::max(0.0, half_mm - 0.5 * std::abs(along_mm));
     return random.uniform(-middle_mm, middle_mm) - 0.5 * along_mm;
   };
-  track.x_mm = begin(stage.half_x_mm(), way_mm * track.along_x);
-  track.y_mm = begin(stage.half_y_mm(), way_mm * track.along_y);
+  track.x_mm = begin(builder.half_x_mm(), way_mm * track.along_x);
+  track.y_mm = begin(builder.half_y_mm(), way_mm * track.along_y);
 }
 
 } // namespace
 
-void pull(Episode &episode, const Stage &stage, std::size_t n) {
-  const Pulling chosen = pulling(stage, n);
+void add_tangential_load(Episode &episode, const ScenarioBuilder &builder, std::size_t n) {
+  const ChosenLoad chosen = choose_load(builder, n);
   for (Track &track : episode.tracks) {
-    track.pull.along_x = std::cos(chosen.angle_rad);
-    track.pull.along_y = std::sin(chosen.angle_rad);
-    track.pull.share = chosen.share;
+    track.tangential.along_x = std::cos(chosen.angle_rad);
+    track.tangential.along_y = std::sin(chosen.angle_rad);
+    track.tangential.share = chosen.share;
   }
   episode.friction = chosen.friction;
 }
 
 // A gripped object whose weight the pad takes over, carries and gives back.
-Episode lift(const Stage &stage, std::size_t n) {
+Episode lift(const ScenarioBuilder &builder, std::size_t n) {
   constexpr double CARRIES_s = 1.0;
-  Random random(stage.options.seed, LIFT, n);
-  const Place place = stage.random_place(random);
-  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+  Random random(builder.options.seed, LIFT, n);
+  const Place place = builder.random_place(random);
+  const double force_N = builder.forces.pick(n, random.uniform(0.0, 1.0));
   const double lift_s = LIFTS_s[n % LIFTS_s.size()];
-  const Pulling chosen = pulling(stage, n);
+  const ChosenLoad chosen = choose_load(builder, n);
   Episode episode;
   episode.press = "lift";
   episode.friction = chosen.friction;
   Track track = track_at(place);
   aim(track, chosen.angle_rad);
-  track.pull.friction = Profile(chosen.friction);
-  track.pull.travel_mm = stage.options.dead_travel_mm;
+  track.tangential.friction = Profile(chosen.friction);
+  track.tangential.travel_mm = builder.options.dead_travel_mm;
   const double begin_s = touch_and_hold(episode, track, force_N, random.uniform(0.5, 0.7));
-  Profile &load_N = track.pull.load_N;
+  Profile &load_N = track.tangential.load_N;
   load_N.hold(begin_s);
   load_N.ease(lift_s, chosen.share * force_N);
   phase(episode, "lift", load_N.end_s());
@@ -83,24 +83,24 @@ Episode lift(const Stage &stage, std::size_t n) {
 }
 
 // A weight rests on the pad; a string pulls it with a known force, then until it slides.
-Episode drag(const Stage &stage, std::size_t n) {
+Episode drag(const ScenarioBuilder &builder, std::size_t n) {
   constexpr double WAY_mm = 8.0, KNOWN_s = 3.0, LOADS_s = 0.5;
-  Random random(stage.options.seed, DRAG, n);
-  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
-  const Pulling chosen = pulling(stage, n);
+  Random random(builder.options.seed, DRAG, n);
+  const double force_N = builder.forces.pick(n, random.uniform(0.0, 1.0));
+  const ChosenLoad chosen = choose_load(builder, n);
   Episode episode;
   episode.press = "drag";
   episode.friction = chosen.friction;
   episode.mass_kg = force_N / GRAVITY_m_s2;
-  episode.speed_mm_s = stage.speed_mm_s(n, DRAG_SPEEDS_mm_s);
+  episode.speed_mm_s = builder.speed_mm_s(n, DRAG_SPEEDS_mm_s);
   Track track;
   // x, y and back, by default.
-  aim(track, stage.tangential.angle_deg.value_or(90.0 * static_cast<double>(n % 4)) * DEGREE);
-  track.pull.friction = Profile(chosen.friction);
-  track.pull.travel_mm = stage.options.dead_travel_mm;
-  place_way(track, WAY_mm + track.pull.travel_mm, stage, random);
+  aim(track, builder.tangential.angle_deg.value_or(90.0 * static_cast<double>(n % 4)) * DEGREE);
+  track.tangential.friction = Profile(chosen.friction);
+  track.tangential.travel_mm = builder.options.dead_travel_mm;
+  place_way(track, WAY_mm + track.tangential.travel_mm, builder, random);
   const double begin_s = touch_and_hold(episode, track, force_N, random.uniform(0.9, 1.1));
-  Profile &load_N = track.pull.load_N;
+  Profile &load_N = track.tangential.load_N;
   load_N.hold(begin_s);
   load_N.ease(LOADS_s, chosen.share * force_N);
   phase(episode, "load", load_N.end_s());
@@ -151,19 +151,19 @@ constexpr double CARRIED_MIN = 0.4, CARRIED_MAX = 0.9; // of what static frictio
 // Rubber of the stiffness at which the usual grip's object slips after the usual dead travel.
 class Rubber {
 public:
-  explicit Rubber(const Stage &stage) : stage_(stage) {}
+  explicit Rubber(const ScenarioBuilder &builder) : builder_(builder) {}
   double stiffness_N_mm(double force_N) const {
     constexpr double USUAL_N = 6.0, USUAL_FRICTION = 0.5;
-    return 1.5 * USUAL_FRICTION * USUAL_N / stage_.options.dead_travel_mm * stage_.table.contact_radius_mm(force_N) /
-           stage_.table.contact_radius_mm(USUAL_N);
+    return 1.5 * USUAL_FRICTION * USUAL_N / builder_.options.dead_travel_mm * builder_.table.contact_radius_mm(force_N) /
+           builder_.table.contact_radius_mm(USUAL_N);
   }
   double dead_travel_mm(double force_N, double friction) const { return 1.5 * friction * force_N / stiffness_N_mm(force_N); }
 
 private:
-  const Stage &stage_;
+  const ScenarioBuilder &builder_;
 };
 
-Course run(const Script &script, const Stage &stage) {
+Course run(const Script &script, const ScenarioBuilder &builder) {
   constexpr double MS_s = 1e-3, LONGEST_s = 120.0;
   // A thread with the hand at its end; the damping keeps it from ringing.
   constexpr double STRING_N_mm = 10.0, STRING_DAMPING = 0.5;
@@ -171,8 +171,8 @@ Course run(const Script &script, const Stage &stage) {
   const int steps = static_cast<int>(std::lround(MS_s / HeldObject::STEP_s));
   const double mass_kg = 0.5 * script.mass_kg;
   const double damping_N_s_mm = 2e-3 * STRING_DAMPING * std::sqrt(1e3 * STRING_N_mm * mass_kg);
-  const Rubber rubber(stage);
-  HeldObject object(mass_kg, script.friction, stage.options.kinetic_share);
+  const Rubber rubber(builder);
+  HeldObject object(mass_kg, script.friction, builder.options.kinetic_share);
   Profile lowered(1.0), grip_N = script.grip_N;
   double over_s = script.over_s, slip_s = std::numeric_limits<double>::infinity();
   double slip_mm = 0.0, straight_mm = 0.0;
@@ -253,19 +253,19 @@ double slide_force_N(double mass_kg, double friction, double kinetic_share) {
 
 // A gripped object that friction holds, or does not: pulled by hand, heavier than the grip can
 // hold, held by a grip that loosens, or carried.
-Episode slide(const Stage &stage, std::size_t n) {
+Episode slide(const ScenarioBuilder &builder, std::size_t n) {
   constexpr double RESERVE = 0.6; // of kinetic friction: what the weight takes in a firm grip
   constexpr double FORCE_MIN_N = 1.0;
   constexpr double WAY_MAX_mm = 13.0; // fits between the usual borders, whatever its direction
   constexpr double TAKES_s = 0.3, CARRIES_s = 0.5;
-  Random random(stage.options.seed, SLIDE, n);
-  const Rubber rubber(stage);
+  Random random(builder.options.seed, SLIDE, n);
+  const Rubber rubber(builder);
   Script script;
-  script.friction = stage.friction.at(random.uniform(0.0, 1.0));
-  script.mass_kg = stage.mass_kg.at(random.uniform(0.0, 1.0));
-  const double gripped_N = stage.forces.pick(n / 4, random.uniform(0.0, 1.0));
+  script.friction = builder.friction.at(random.uniform(0.0, 1.0));
+  script.mass_kg = builder.mass_kg.at(random.uniform(0.0, 1.0));
+  const double gripped_N = builder.forces.pick(n / 4, random.uniform(0.0, 1.0));
   double weight_N = 0.5 * GRAVITY_m_s2 * script.mass_kg, force_N = gripped_N, speed_mm_s = 0.0;
-  const double kinetic = stage.options.kinetic_share * script.friction;
+  const double kinetic = builder.options.kinetic_share * script.friction;
   const double firm_N = weight_N / (RESERVE * kinetic);
   double slides_mm = 0.0;
   const auto pull_by_hand = [&] {
@@ -279,7 +279,7 @@ Episode slide(const Stage &stage, std::size_t n) {
   case 0: {
     script.name = "pull";
     force_N = std::max(gripped_N, firm_N);
-    const std::vector<double> &given_mm_s = stage.options.speeds_mm_s;
+    const std::vector<double> &given_mm_s = builder.options.speeds_mm_s;
     const double drawn_mm_s = random.log_uniform(2.0, SLIDE_SPEED_MAX_mm_s);
     speed_mm_s = given_mm_s.empty() ? drawn_mm_s : given_mm_s[n / 4 % given_mm_s.size()];
     script.weight_N.ease(TAKES_s, weight_N);
@@ -321,7 +321,7 @@ Episode slide(const Stage &stage, std::size_t n) {
     script.notice_mm = random.uniform(1.0, 4.0);
     script.caught_N = std::max(force_N, BRAKES * weight_N / kinetic);
   }
-  Course course = run(script, stage);
+  Course course = run(script, builder);
   for (int i = 0; i < 8 && course.farthest_mm > WAY_MAX_mm; i++) {
     script.notice_s *= 0.7;
     script.notice_mm *= 0.7;
@@ -329,7 +329,7 @@ Episode slide(const Stage &stage, std::size_t n) {
       slides_mm *= 0.7;
       pull_by_hand();
     }
-    course = run(script, stage);
+    course = run(script, builder);
   }
 
   Episode episode;
@@ -339,35 +339,35 @@ Episode slide(const Stage &stage, std::size_t n) {
   episode.speed_mm_s = course.fastest_mm_s;
   Track track;
   double angle_rad = random.uniform(-M_PI, M_PI);
-  for (int i = 0; i < 50 && course.farthest_mm * std::abs(std::cos(angle_rad)) > 2.0 * stage.half_x_mm(); i++) {
+  for (int i = 0; i < 50 && course.farthest_mm * std::abs(std::cos(angle_rad)) > 2.0 * builder.half_x_mm(); i++) {
     angle_rad = random.uniform(-M_PI, M_PI);
   }
   aim(track, angle_rad);
-  place_way(track, course.farthest_mm, stage, random);
+  place_way(track, course.farthest_mm, builder, random);
   const double begin_s = touch_and_hold(episode, track, force_N, random.uniform(0.5, 0.7));
   track.force_N.trace(course.force_N, 1e-5);
   track.pusher_mm.hold(begin_s).trace(course.way_mm, 1e-4);
-  track.pull.load_N.hold(begin_s).trace(course.pull_N, 1e-5);
-  track.pull.friction = Profile(script.friction);
-  track.pull.friction.hold(begin_s).trace(course.friction, 1e-5);
+  track.tangential.load_N.hold(begin_s).trace(course.pull_N, 1e-5);
+  track.tangential.friction = Profile(script.friction);
+  track.tangential.friction.hold(begin_s).trace(course.friction, 1e-5);
   slide_phases(episode, course.phases, begin_s);
-  track.pull.load_N.ease(TOUCHES_s, 0.0);
+  track.tangential.load_N.ease(TOUCHES_s, 0.0);
   release(episode, track);
   return episode;
 }
 
 // A gripped object is turned about the grasp's axis, to either side: rubber winds up until friction gives way, then the object spins.
-Episode screw(const Stage &stage, std::size_t n) {
+Episode screw(const ScenarioBuilder &builder, std::size_t n) {
   constexpr double TORQUE_RISES_s = 0.4; // from none to what friction holds
   constexpr double LOADS_s = 0.3;
-  Random random(stage.options.seed, SCREW, n);
-  const Place place = stage.random_place(random);
-  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
-  const Pulling chosen = pulling(stage, n);
+  Random random(builder.options.seed, SCREW, n);
+  const Place place = builder.random_place(random);
+  const double force_N = builder.forces.pick(n, random.uniform(0.0, 1.0));
+  const ChosenLoad chosen = choose_load(builder, n);
   const double load_N = chosen.share * force_N;
-  const Layer layer = silicone(stage.options.layer_mm);
+  const Layer layer = silicone(builder.options.layer_mm);
   const double shear_MPa = 1e-6 * layer.youngs_modulus_Pa / (2.0 * (1.0 + layer.poisson));
-  const double radius_mm = stage.table.contact_radius_mm(force_N);
+  const double radius_mm = builder.table.contact_radius_mm(force_N);
   const double side = random.uniform(0.0, 1.0) < 0.5 ? -1.0 : 1.0;
   const double rate = TWIST_RATES_deg_s[n % TWIST_RATES_deg_s.size()] * DEGREE;
   // Where all of a Hertz contact turns, friction that points against a slow way as well holds it
@@ -378,11 +378,11 @@ Episode screw(const Stage &stage, std::size_t n) {
   episode.friction = chosen.friction;
   Track track = track_at(place);
   aim(track, chosen.angle_rad);
-  track.pull.friction = Profile(chosen.friction);
-  track.pull.travel_mm = stage.options.dead_travel_mm;
+  track.tangential.friction = Profile(chosen.friction);
+  track.tangential.travel_mm = builder.options.dead_travel_mm;
   track.angle_rad = Profile(random.uniform(-45.0, 45.0) * DEGREE);
   const double begin_s = touch_and_hold(episode, track, force_N, random.uniform(0.5, 0.7));
-  Profile &loaded_N = track.pull.load_N;
+  Profile &loaded_N = track.tangential.load_N;
   loaded_N.hold(begin_s);
   if (load_N > 0.0) {
     loaded_N.ease(LOADS_s, load_N);

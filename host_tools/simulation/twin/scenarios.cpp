@@ -48,7 +48,7 @@ PaperGrid grid_of_pad() {
 
 // The functions below make the nth episode of a kind.
 
-static Episode grid(const Stage &stage, std::size_t n) {
+static Episode grid(const ScenarioBuilder &builder, std::size_t n) {
   struct Way {
     const char *name;
     double ramp_s, hold_s;
@@ -61,61 +61,61 @@ static Episode grid(const Stage &stage, std::size_t n) {
   std::iota(order.begin(), order.end(), 0);
   const std::size_t way = n % ways.size(), nth_place = n / ways.size() % order.size();
   const std::size_t pass = n / (ways.size() * order.size());
-  Random random(stage.options.seed, GRID_ORDER, pass);
+  Random random(builder.options.seed, GRID_ORDER, pass);
   for (std::size_t i = order.size() - 1; i > 0; i--) {
     std::swap(order[i], order[random.next() % (i + 1)]);
   }
   const int at = order[nth_place];
   const int row = at / across, column = at % across;
-  Random strength(stage.options.seed, GRID, n);
+  Random strength(builder.options.seed, GRID, n);
   // Forces in turn: after some passes every place has had all of them in every way.
   const std::size_t turn = static_cast<std::size_t>(at) + pass + 2 * way;
   const Place place{grid.step_mm * (column - across / 2), grid.step_mm * (row - along / 2)};
-  Episode episode = press(ways[way].name, place, stage.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[way].ramp_s, ways[way].hold_s);
+  Episode episode = press(ways[way].name, place, builder.forces.pick(turn, strength.uniform(0.0, 1.0)), ways[way].ramp_s, ways[way].hold_s);
   episode.sensors_near = (column % 2 == 0 ? 2 : 1) * (row % 2 == 0 ? 2 : 1);
   return episode;
 }
 
-static Episode random_press(const Stage &stage, std::size_t n, const std::string &name, double ramp_s, double hold_s) {
-  Random random(stage.options.seed, TAPS, n);
-  const Place place = stage.random_place(random);
-  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+static Episode random_press(const ScenarioBuilder &builder, std::size_t n, const std::string &name, double ramp_s, double hold_s) {
+  Random random(builder.options.seed, TAPS, n);
+  const Place place = builder.random_place(random);
+  const double force_N = builder.forces.pick(n, random.uniform(0.0, 1.0));
   const double ramps_s = milliseconds(ramp_s * random.uniform(0.7, 1.3));
   return press(name, place, force_N, ramps_s, hold_s);
 }
 
-static Episode tap(const Stage &stage, std::size_t n) { return random_press(stage, n, "tap", 0.12, 0.3); }
+static Episode tap(const ScenarioBuilder &builder, std::size_t n) { return random_press(builder, n, "tap", 0.12, 0.3); }
 
-static Episode hold(const Stage &stage, std::size_t n) {
-  Random random(stage.options.seed, HOLD, n);
-  return random_press(stage, n, "hold", 0.2, milliseconds(random.log_uniform(0.2, 10.0)));
+static Episode hold(const ScenarioBuilder &builder, std::size_t n) {
+  Random random(builder.options.seed, HOLD, n);
+  return random_press(builder, n, "hold", 0.2, milliseconds(random.log_uniform(0.2, 10.0)));
 }
 
-static Episode high(const Stage &stage, std::size_t n) { return random_press(stage, n, "hold", 0.5, 0.6); }
+static Episode high(const ScenarioBuilder &builder, std::size_t n) { return random_press(builder, n, "hold", 0.5, 0.6); }
 
 // A weight is set down by hand, rests by itself and is lifted.
-static Episode placement(const Stage &stage, std::size_t n) {
+static Episode placement(const ScenarioBuilder &builder, std::size_t n) {
   constexpr double RESTS_s = 2.0;
-  Random random(stage.options.seed, PLACEMENTS, n);
-  const Place place = stage.random_place(random);
-  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+  Random random(builder.options.seed, PLACEMENTS, n);
+  const Place place = builder.random_place(random);
+  const double force_N = builder.forces.pick(n, random.uniform(0.0, 1.0));
   return press("placement", place, force_N, milliseconds(random.uniform(0.2, 0.5)), RESTS_s);
 }
 
 // A poke by hand: never at rest, and not quite at one place.
-static Episode poke(const Stage &stage, std::size_t n) {
+static Episode poke(const ScenarioBuilder &builder, std::size_t n) {
   constexpr double WANDER_mm = 1.5;
-  Random random(stage.options.seed, POKES, n);
+  Random random(builder.options.seed, POKES, n);
   Episode episode;
   episode.press = "poke";
-  Track track = track_at(stage.random_place(random));
+  Track track = track_at(builder.random_place(random));
   const double direction = random.uniform(0.0, 2.0 * M_PI);
   track.along_x = std::cos(direction);
   track.along_y = std::sin(direction);
   const int changes = 3 + static_cast<int>(random.next() % 5);
   for (int i = 0; i < changes; i++) {
     const double seconds = random.uniform(0.15, 0.6);
-    track.force_N.ease(seconds, stage.forces.pick(n, random.uniform(0.0, 1.0)));
+    track.force_N.ease(seconds, builder.forces.pick(n, random.uniform(0.0, 1.0)));
     track.pusher_mm.ease(seconds, random.uniform(0.0, WANDER_mm));
     if (i == 0) {
       phase(episode, "touch", track.force_N.end_s());
@@ -129,14 +129,14 @@ static Episode poke(const Stage &stage, std::size_t n) {
 }
 
 // Slow enough that only what does not depend on the rate makes a loop, save relaxation.
-static Episode cycle(const Stage &stage, std::size_t n) {
+static Episode cycle(const ScenarioBuilder &builder, std::size_t n) {
   constexpr double RAMP_s = 15.0;
-  Random random(stage.options.seed, CYCLE, n);
-  const Place place = n == 0 ? Place{0.0, 0.0} : stage.random_place(random);
+  Random random(builder.options.seed, CYCLE, n);
+  const Place place = n == 0 ? Place{0.0, 0.0} : builder.random_place(random);
   Episode episode;
   episode.press = "cycle";
   Track track = track_at(place);
-  track.force_N.line(RAMP_s, stage.forces.pick(n, random.uniform(0.0, 1.0)));
+  track.force_N.line(RAMP_s, builder.forces.pick(n, random.uniform(0.0, 1.0)));
   phase(episode, "load", track.force_N.end_s());
   track.force_N.line(RAMP_s, 0.0);
   phase(episode, "unload", track.force_N.end_s());
@@ -154,20 +154,20 @@ static double time_of(const Profile &way, double length_mm, double begin_s, doub
   return milliseconds(high);
 }
 
-static Episode slip(const Stage &stage, std::size_t n) {
-  Random random(stage.options.seed, SLIP, n);
+static Episode slip(const ScenarioBuilder &builder, std::size_t n) {
+  Random random(builder.options.seed, SLIP, n);
   const bool upward = random.uniform(0.0, 1.0) < 0.5;
   const double slack_mm = 0.5 * (SLIP_SPAN_mm - SLIP_WAY_mm);
   const double x_mm = random.uniform(-grid_of_pad().half_x_mm, grid_of_pad().half_x_mm);
   const double y_mm = -0.5 * SLIP_WAY_mm + random.uniform(-slack_mm, slack_mm);
   Episode episode;
   episode.press = "grip";
-  episode.speed_mm_s = stage.speed_mm_s(n, SLIP_SPEEDS_mm_s);
+  episode.speed_mm_s = builder.speed_mm_s(n, SLIP_SPEEDS_mm_s);
   Track track = track_at({x_mm, upward ? y_mm : -y_mm});
   track.along_y = upward ? 1.0 : -1.0;
-  track.grip = {stage.options.dead_travel_mm, stage.options.creep_share, stage.options.stick_slip_mm};
+  track.grip = {builder.options.dead_travel_mm, builder.options.creep_share, builder.options.stick_slip_mm};
   track.angle_rad = Profile(random.uniform(-15.0, 15.0) * DEGREE);
-  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+  const double force_N = builder.forces.pick(n, random.uniform(0.0, 1.0));
 
   const double push_s = touch_and_hold(episode, track, force_N, random.uniform(0.8, 1.2));
   track.pusher_mm.hold(push_s);
@@ -181,15 +181,15 @@ static Episode slip(const Stage &stage, std::size_t n) {
   return episode;
 }
 
-static Episode twist(const Stage &stage, std::size_t n) {
+static Episode twist(const ScenarioBuilder &builder, std::size_t n) {
   constexpr double TURN_deg = 90.0;
-  Random random(stage.options.seed, TWIST, n);
+  Random random(builder.options.seed, TWIST, n);
   Episode episode;
   episode.press = "grip";
-  Track track = track_at(stage.random_place(random));
+  Track track = track_at(builder.random_place(random));
   const double from = random.uniform(-45.0, 45.0) * DEGREE;
   track.angle_rad = Profile(from);
-  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
+  const double force_N = builder.forces.pick(n, random.uniform(0.0, 1.0));
   const double begin_s = touch_and_hold(episode, track, force_N, random.uniform(0.5, 0.7));
   track.angle_rad.hold(begin_s);
   const double rate = TWIST_RATES_deg_s[n % TWIST_RATES_deg_s.size()] * DEGREE;
@@ -205,17 +205,17 @@ static double half_width_mm(const ScenarioOptions &options) {
 }
 
 // The contact rolls across the pad's long edge, until nothing of it is left on the pad.
-static Episode rolloff(const Stage &stage, std::size_t n) {
-  Random random(stage.options.seed, ROLLOFF, n);
+static Episode rolloff(const ScenarioBuilder &builder, std::size_t n) {
+  Random random(builder.options.seed, ROLLOFF, n);
   Episode episode;
   episode.press = "roll";
-  episode.speed_mm_s = stage.speed_mm_s(n, ROLL_SPEEDS_mm_s);
+  episode.speed_mm_s = builder.speed_mm_s(n, ROLL_SPEEDS_mm_s);
   Track track = track_at({random.uniform(-2.0, 2.0), random.uniform(-grid_of_pad().half_y_mm, grid_of_pad().half_y_mm)});
   track.along_x = 1.0;
   track.along_y = 0.0;
-  const double force_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
-  track.edge_x_mm = half_width_mm(stage.options);
-  track.radius_mm = stage.table.contact_radius_mm(force_N);
+  const double force_N = builder.forces.pick(n, random.uniform(0.0, 1.0));
+  track.edge_x_mm = half_width_mm(builder.options);
+  track.radius_mm = builder.table.contact_radius_mm(force_N);
   track.pusher_mm.hold(touch_and_hold(episode, track, force_N, random.uniform(0.4, 0.6)));
   track.pusher_mm.travel(track.edge_x_mm + track.radius_mm - track.x_mm, episode.speed_mm_s, SPEED_UP_s);
   track.force_N.hold(track.pusher_mm.end_s() - track.force_N.end_s());
@@ -224,16 +224,16 @@ static Episode rolloff(const Stage &stage, std::size_t n) {
   return episode;
 }
 
-static Episode two(const Stage &stage, std::size_t n) {
-  Random random(stage.options.seed, TWO, n);
+static Episode two(const ScenarioBuilder &builder, std::size_t n) {
+  Random random(builder.options.seed, TWO, n);
   const double distance = DISTANCES_mm[n % DISTANCES_mm.size()];
   // The far ones lie along the pad, which is too narrow for them.
   const double direction = distance > 2.0 * grid_of_pad().half_x_mm ? random.uniform(60.0, 120.0) : random.uniform(0.0, 180.0);
   const double half_x = 0.5 * distance * std::cos(direction * DEGREE);
   const double half_y = 0.5 * distance * std::sin(direction * DEGREE);
   const double x_mm = random.uniform(-2.0, 2.0), y_mm = random.uniform(-2.0, 2.0);
-  const double one_N = stage.forces.pick(n, random.uniform(0.0, 1.0));
-  const double other_N = stage.forces.pick(n + 1, random.uniform(0.0, 1.0));
+  const double one_N = builder.forces.pick(n, random.uniform(0.0, 1.0));
+  const double other_N = builder.forces.pick(n + 1, random.uniform(0.0, 1.0));
   Episode episode = press("two", {x_mm - half_x, y_mm - half_y}, one_N, 0.25, 0.5);
   episode.tracks.push_back(press("two", {x_mm + half_x, y_mm + half_y}, other_N, 0.25, 0.5).tracks.front());
   return episode;
@@ -451,21 +451,21 @@ Scenario make_scenario(const ScenarioOptions &options, const ContactTable &table
   const ScenarioOptions &chosen = scenario.options;
   const bool pulled_by_share = Tangential(chosen.tangential).share.highest > 0.0;
   scenario.pulls = pulled_by_share || chosen.kind == "drag" || chosen.kind == "slide";
-  Stage stage(chosen, table);
+  ScenarioBuilder builder(chosen, table);
   for (std::size_t n = 0;; n++) {
-    Episode episode = kind.episode(stage, n);
+    Episode episode = kind.episode(builder, n);
     if (pulled_by_share && !kind.pulls_itself) {
-      pull(episode, stage, n);
+      add_tangential_load(episode, builder, n);
     }
-    if (!stage.add(std::move(episode))) {
+    if (!builder.add(std::move(episode))) {
       break;
     }
   }
-  if (stage.episodes.empty()) {
+  if (builder.episodes.empty()) {
     throw Error("--seconds " + number(*chosen.seconds) + " is too short for one contact of \"" + chosen.kind + "\"; leave it out for " +
                 number(kind.usual_seconds));
   }
-  scenario.episodes = std::move(stage.episodes);
+  scenario.episodes = std::move(builder.episodes);
   scenario.name = name_of(chosen);
   return scenario;
 }

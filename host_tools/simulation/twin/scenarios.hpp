@@ -24,14 +24,14 @@ constexpr double AMBIENT_Pa = 101325.0;
 // Without overhang_mm; the paper's box is 30 mm by 50 mm.
 constexpr double PAD_OVERHANG_mm = 6.0;
 
-class Stage;
+class ScenarioBuilder;
 struct Episode;
 struct ScenarioKind {
   std::string name;
   double usual_seconds;
   std::string usual_forces;
   std::string description;
-  Episode (*episode)(const Stage &stage, std::size_t n); // the nth
+  Episode (*episode)(const ScenarioBuilder &builder, std::size_t n); // the nth
   const char *usual_indenter = "sphere6";
   double usual_margin_steps = 0.5; // of the paper's grid
   const char *usual_tangential = "0", *usual_friction = "0.5";
@@ -84,7 +84,7 @@ struct ScenarioOptions {
   std::string mass_kg;                           // Range, kind "slide"; empty: usual
   double kinetic_share = 0.8;                    // kind "slide": kinetic friction per static one
   std::vector<double> speeds_mm_s;               // of what moves by a speed; empty: usual ones
-  double dead_travel_mm = 1.0;                   // Grip; Pull; of a slide at 6 N, friction 0.5
+  double dead_travel_mm = 1.0;                   // Grip; TangentialLoad; of a slide at 6 N, friction 0.5
   double creep_share = 0.5, stick_slip_mm = 0.0; // Grip, kind "slip"
   std::optional<double> margin_mm;               // else the kind's usual one
   double quiet_s = 1.2;

@@ -129,16 +129,16 @@ Touch Track::at(double t_s) const {
     contact.x_mm -= part.back * radius_mm;
     contact.force_N *= part.share;
   }
-  const double load_N = pull.load_N.at(t_s);
+  const double load_N = tangential.load_N.at(t_s);
   if (load_N != 0.0) {
-    contact.stuck_N = stuck_force_N(contact.force_N, std::abs(load_N), pull.friction.at(t_s));
-    const double moved = std::copysign(pull.travel_mm, load_N) * (1.0 - std::pow(contact.stuck_N / contact.force_N, 2.0 / 3.0));
-    contact.x_mm += pull.along_x * moved;
-    contact.y_mm += pull.along_y * moved;
+    contact.stuck_N = stuck_force_N(contact.force_N, std::abs(load_N), tangential.friction.at(t_s));
+    const double moved = std::copysign(tangential.travel_mm, load_N) * (1.0 - std::pow(contact.stuck_N / contact.force_N, 2.0 / 3.0));
+    contact.x_mm += tangential.along_x * moved;
+    contact.y_mm += tangential.along_y * moved;
   }
-  const double pull_N = pull.share * contact.force_N + load_N;
-  contact.pull_x_N = pull_N * pull.along_x;
-  contact.pull_y_N = pull_N * pull.along_y;
+  const double pull_N = tangential.share * contact.force_N + load_N;
+  contact.pull_x_N = pull_N * tangential.along_x;
+  contact.pull_y_N = pull_N * tangential.along_y;
   return contact;
 }
 

@@ -60,7 +60,7 @@ struct Grip {
 // oblique push, or a load that comes while the normal force stays, as a weight does. Under a load the object and its contact move along: by
 // travel_mm when all slides and by 1 - (1 - Q / (friction F))^(2/3) of it before (Mindlin, as in Grip), and back the same way. Where a
 // HeldObject moves, its way is the pusher's, and travel_mm is 0.
-struct Pull {
+struct TangentialLoad {
   double along_x = 1.0, along_y = 0.0; // unit vector
   double share = 0.0;
   Profile load_N; // at most friction times the normal force, 0 as long as share is not
@@ -87,7 +87,7 @@ struct Track {
   Profile pusher_mm;
   Grip grip;
   Profile angle_rad;
-  Pull pull;
+  TangentialLoad tangential;
   // Where the pad ends in x, and the radius of the contact then: what is beyond carries nothing.
   // The disc's part on the pad is applied at that part's centre, with its share of the force.
   double edge_x_mm = std::numeric_limits<double>::infinity();

@@ -81,7 +81,7 @@ TEST(Slide, SlipsWhereTheLoadReachesFrictionAndNowhereElse) {
         const double holds_N = episode.friction * touch.force_N;
         EXPECT_LE(pull_N(touch), holds_N + 1e-4);
         if (phase.slip && t_s > phase.begin_s + 1.5 * MS_s && t_s < phase.end_s - 1.5 * MS_s) {
-          EXPECT_NEAR(pull_N(touch), track.pull.friction.at(local_s) * touch.force_N, 2e-4);
+          EXPECT_NEAR(pull_N(touch), track.tangential.friction.at(local_s) * touch.force_N, 2e-4);
           EXPECT_GE(pull_N(touch), 0.8 * holds_N - 2e-4);
           EXPECT_NEAR(touch.stuck_N, 0.0, 5e-4);
         }
