@@ -73,7 +73,7 @@ class Fit(unittest.TestCase):
         fixed = MEASURE.made("fit_result", 4)
         fixed.flags.writeable = False
         with self.assertRaisesRegex(MeasureError, "argument 8: an array that is written"):
-            MEASURE.call("fit", "fit", 2, ARRAY, settings, MEASURE.no_own, readings, np.full(4, ALL, np.uint64), fixed, np.zeros(1))
+            MEASURE.call("fit", "fit", 2, ARRAY, settings, None, readings, np.full(4, ALL, np.uint64), fixed, np.zeros(1))
         with self.assertRaisesRegex(MeasureError, "fit: another number of arguments"):
             MEASURE.call("fit", "fit")
         for of_other_version in (MEASURE.call, MEASURE.made):
@@ -169,10 +169,10 @@ class Calibration(unittest.TestCase):
         readings_Pa = gain * MEASURE.base_pressure("sphere15", 12.0, touches) + 0.5 * random.normal(15)
         readings_Pa[0, 3] = np.nan
         self.assertEqual(usable_of(readings_Pa)[0], ALL & ~np.uint64(8))
-        found, sensors, own = MEASURE.calibrate(X_mm, Y_mm, PITCH_mm, 8.0 * np.arange(24.0)[None], readings_Pa[None], 0.5)
+        found, sensors, deviations = MEASURE.calibrate(X_mm, Y_mm, PITCH_mm, 8.0 * np.arange(24.0)[None], readings_Pa[None], 0.5)
         self.assertEqual((int(found["state"][0]), found["reason"][0]), (1, b"none"))
         self.assertLess(abs(sensors["gain"][0] - gain / gain.mean()).max(), 0.06)
-        self.assertEqual(own.shape, (1, 15))
+        self.assertEqual(deviations.shape, (1, 15))
 
 
 class RandomNumbers(unittest.TestCase):

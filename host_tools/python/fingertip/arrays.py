@@ -88,6 +88,8 @@ class Library:
         return found
 
     def call(self, name, *values):
+        """None: no deviations of sensors."""
+        values = [self.made("fit_deviation", 0, 0) if value is None else value for value in values]
         values = [
             value.encode() if isinstance(value, str) else str(value).encode() if isinstance(value, pathlib.Path) else value
             for value in values
@@ -128,7 +130,6 @@ def usable_of(readings):
 class Firmware(Library):
     def __init__(self, path):
         super().__init__(path)
-        self.no_own = np.zeros((0, 0), self.records.get("fit_deviation", "V12"))
 
     @property
     def constants(self):
@@ -166,26 +167,26 @@ class Firmware(Library):
             settings[name] = value
         return settings
 
-    def fit(self, array, settings, pressure_Pa_q10, usable=None, *, own=None, kernel="fit"):
+    def fit(self, array, settings, pressure_Pa_q10, usable=None, *, deviations=None, kernel="fit"):
         """fit_result [press] of readings [press, sensor] in 1/1024 Pa. usable: bitmap [press] of the sensors to use."""
-        return self.timed_fit(array, settings, pressure_Pa_q10, usable, own=own, kernel=kernel, threads=2)[0]
+        return self.timed_fit(array, settings, pressure_Pa_q10, usable, deviations=deviations, kernel=kernel, threads=2)[0]
 
-    def timed_fit(self, array, settings, pressure_Pa_q10, usable=None, *, own=None, kernel="fit", threads=1):
+    def timed_fit(self, array, settings, pressure_Pa_q10, usable=None, *, deviations=None, kernel="fit", threads=1):
         """(fit_result [press], microseconds of processor time for each)."""
         found, us = self.made("fit_result", len(pressure_Pa_q10)), np.zeros(1)
         if usable is None:
             usable = np.full(len(found), (1 << pressure_Pa_q10.shape[1]) - 1, np.uint64)
-        self.call("fit", kernel, threads, array, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, found, us)
+        self.call("fit", kernel, threads, array, settings, deviations, pressure_Pa_q10, usable, found, us)
         return found, float(us[0])
 
-    def fit_held(self, array, settings, pressure_Pa_q10, usable=None, *, own=None):
+    def fit_held(self, array, settings, pressure_Pa_q10, usable=None, *, deviations=None):
         """fit_result of presses that are held [press, frame, sensor], or for seven frames alike [press, sensor]: of the last frame, with what the firmware's
         search for a tangential force has found in the frames before. One frame alone is not searched."""
         if pressure_Pa_q10.ndim == 2:
             pressure_Pa_q10 = np.repeat(pressure_Pa_q10[:, None], 7, axis=1)
         found = self.made("fit_result", len(pressure_Pa_q10))
         usable = self.usable(pressure_Pa_q10, usable)
-        self.call("fit_held", array, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, found)
+        self.call("fit_held", array, settings, deviations, pressure_Pa_q10, usable, found)
         return found
 
     @staticmethod
@@ -203,7 +204,7 @@ class Firmware(Library):
         profile["from_touch"] = from_touch
         return profile
 
-    def tangential(self, array, profile, settings, pressure_Pa_q10, usable=None, saturated=None, *, own=None):
+    def tangential(self, array, profile, settings, pressure_Pa_q10, usable=None, saturated=None, *, deviations=None):
         """(fit_result, fit_tangential), each [contact, frame], of readings [contact, frame, sensor]; profile: one for all."""
         pad = self.made("fit_pad", 1)
         self.call("tangential_pad", array, profile, pad)
@@ -211,7 +212,7 @@ class Firmware(Library):
         usable = self.usable(pressure_Pa_q10, usable)
         saturated = np.zeros(shape, np.uint64) if saturated is None else saturated
         found = self.made("fit_result", *shape), self.made("fit_tangential", *shape)
-        self.call("tangential", array, pad, settings, self.no_own if own is None else own, pressure_Pa_q10, usable, saturated, *found)
+        self.call("tangential", array, pad, settings, deviations, pressure_Pa_q10, usable, saturated, *found)
         return found
 
     def calibrate(self, x_mm, y_mm, pitch_mm, t_s, reading_Pa, noise_Pa, *, force_N=1.0, fading=None, last=True):

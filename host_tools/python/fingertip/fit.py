@@ -247,15 +247,15 @@ def inputs(
     dip = {name: known.get(name, 0.0) for name in ("dip_share", "dip_sd_mm")}
     cut = {"clip_below_sds": 0} if has_profile else {}
     settings = chip.settings(noise_Pa=noise_Pa, gain_sd=known.get("gain_sd") or None, **(prior | dip | cut | fields))
-    own = None
+    deviations = None
     if known.get("off_x_mm"):
-        own = chip.made("fit_deviation", 1, len(pad.x_mm))
+        deviations = chip.made("fit_deviation", 1, len(pad.x_mm))
         for key, unit in (("off_x_mm", pad.pitch_mm), ("off_y_mm", pad.pitch_mm), ("wider", 1.0)):
-            own[f"{key.removesuffix('_mm')}_q15"] = round_half_away(
+            deviations[f"{key.removesuffix('_mm')}_q15"] = round_half_away(
                 np.clip(32768.0 * np.asarray(known.get(key, 0.0)) / unit, -32767, 32767)
             )
     readings = np.clip(reading_Pa / np.asarray(known.get("gain", 1.0)), -MOST_Pa, MOST_Pa)
-    return chip.array(*pad[1:4]), settings, q10(readings), usable_of(reading_Pa), own
+    return chip.array(*pad[1:4]), settings, q10(readings), usable_of(reading_Pa), deviations
 
 
 def _begins(peak_Pa: FloatArray, noise_Pa: float, alone: npt.NDArray[np.bool_]) -> npt.NDArray[np.int64]:
@@ -300,7 +300,7 @@ def fit(
             made = chip.profile(of_pad.thickness_mm, of_pad.overhang_mm, layout=of_pad[1:4])
             chip.call("tangential_pad", chip.array(*of_pad[1:4]), made, chip.made("fit_pad", 1))
             profile = made
-    array, settings, readings, usable, own = inputs(chip, of_pad, reading_Pa, known, noise_Pa, profile is not None)
+    array, settings, readings, usable, deviations = inputs(chip, of_pad, reading_Pa, known, noise_Pa, profile is not None)
     rows = np.arange(len(readings))
     alone = np.ones(len(rows), bool)
     if time_s is not None:
@@ -318,7 +318,7 @@ def fit(
     found: dict[str, npt.NDArray[Any]] = {}
     touched = begins >= 0
     for some in np.array_split(rows[touched], len(rows) // ROWS_AT_ONCE + 1):
-        for name, values in _fit(chip, (array, settings, readings, usable, own), profile, known, some, begins[some]).items():
+        for name, values in _fit(chip, (array, settings, readings, usable, deviations), profile, known, some, begins[some]).items():
             found.setdefault(name, np.full(len(rows), np.nan if values.dtype == float else 0, values.dtype))[some] = values
         progress(some[-1] / len(rows) if len(some) else 0.0)
     found["flags"] |= flags | np.where(touched, int(Flag.CONTACT), 0)
@@ -328,15 +328,15 @@ def fit(
 def _fit(
     chip: Any, of: tuple[Any, ...], profile: Any, known: Mapping[str, Any], rows: npt.NDArray[np.int64], begins: npt.NDArray[np.int64]
 ) -> dict[str, npt.NDArray[Any]]:
-    array, settings, readings, usable, own = of
+    array, settings, readings, usable, deviations = of
     frames = int(chip.constants["shapes_frames"]) + 1 if profile is not None else 7  # that fit_held() searches
     before = np.maximum(rows[:, None] - np.arange(frames)[::-1], begins[:, None])
     held, usable = readings[before], usable[before]
-    fits = chip.fit_held(array, settings, np.ascontiguousarray(held[:, -7:]), usable[:, -7:], own=own)
+    fits = chip.fit_held(array, settings, np.ascontiguousarray(held[:, -7:]), usable[:, -7:], deviations=deviations)
     scale = float(known.get("force_scale", 0.0))
     scales = (scale, float(known["force_scale_sd"])) if scale else (1.0, float(chip.constants["default_force_scale_sd"]))
     force_N = np.zeros((len(rows), 2))
-    unsearched = chip.fit(array, settings, readings[rows], usable[:, -1].copy(), own=own)  # that nothing seems to pull
+    unsearched = chip.fit(array, settings, readings[rows], usable[:, -1].copy(), deviations=deviations)  # that nothing seems to pull
     chip.call("weigh", *scales, unsearched, readings[rows].max(axis=1) / 1024.0, force_N)
     flags = fits["flags"].astype(np.int64)
     valid = flags & Flag.FIT_VALID != 0
@@ -345,7 +345,7 @@ def _fit(
     found |= {"force_N": np.where(valid, force_N[:, 0], np.nan), "force_sd_N": np.where(valid, force_N[:, 1], np.nan)}
     found |= {"flags": flags, "sensors_used": fits["used"].astype(np.int64)}
     if profile is not None:
-        _add_shapes(chip, (array, settings, held, usable, own), profile, scales, bool(scale), found)
+        _add_shapes(chip, (array, settings, held, usable, deviations), profile, scales, bool(scale), found)
     return found
 
 
@@ -353,15 +353,17 @@ def _add_shapes(
     chip: Any, of: tuple[Any, ...], profile: Any, scales: tuple[float, float], is_scaled: bool, found: dict[str, npt.NDArray[Any]]
 ) -> None:
     """Where the pad and the array are such that the firmware estimates them."""
-    array, settings, held, usable, own = of
+    array, settings, held, usable, deviations = of
     rows = len(held)
     published, pad = chip.made("published", rows), chip.made("fit_shapes_pad", 1)
     shapes, places = chip.made("fit_shapes_result", rows, 2), chip.made("shapes_location", rows, 2)
-    estimated = [np.ascontiguousarray(each[:, -1]) for each in chip.tangential(array, profile, settings, held, usable, own=own)]
+    estimated = [
+        np.ascontiguousarray(each[:, -1]) for each in chip.tangential(array, profile, settings, held, usable, deviations=deviations)
+    ]
     chip.call("publish", profile, np.full(rows, scales[0] if is_scaled else 0.0), scales[1], *estimated, published)
     with contextlib.suppress(MeasureError):  # rubber too thin for the pitch has no shapes
         chip.call("shapes_pad", array, profile, pad)
-        chip.call("held_shapes", array, pad, settings, chip.no_own if own is None else own, held, usable, published, shapes, places)
+        chip.call("held_shapes", array, pad, settings, deviations, held, usable, published, shapes, places)
     last, shape = shapes[:, 1], shapes["shape"][:, 1].astype(np.int64)
     two, edge = (shape == SHAPES.index(name) for name in ("two", "elongated"))
     valid = published["valid"] & ~two
@@ -405,7 +407,7 @@ def response_of(found: Any, sensors: Any) -> dict[str, Any]:
     names = {"sigma_mm": "prior_sigma_mm", "sigma_sd_mm": "prior_width_mm"}
     names |= {name: name for name in ("dip_share", "dip_sd_mm", "force_scale", "force_scale_sd")}
     of_sensors = {"gain": "gain", "gain_sd": "reading_sd"} | (
-        {name: name for name in ("off_x_mm", "off_y_mm", "wider")} if found["has_own"] else {}
+        {name: name for name in ("off_x_mm", "off_y_mm", "wider")} if found["has_deviations"] else {}
     )
     response: dict[str, Any] = {key: float(found[name]) for key, name in names.items()}
     return response | {key: sensors[name].tolist() for key, name in of_sensors.items()}

@@ -47,7 +47,7 @@ class Contacts(Measure):
                 # What the calibration found.
                 ("dip_share", float),
                 ("dip_sd_mm", float),
-                ("own", self.records["fit_deviation"], SENSORS),
+                ("deviations", self.records["fit_deviation"], SENSORS),
                 # How the pad is cast.
                 ("cast_dip_share", float),
                 ("seat", self.records["twin_seat"], SENSORS),
@@ -93,10 +93,10 @@ class Contacts(Measure):
         kinds = sessions.kinds(self, *kinds)[np.arange(len(seeds)) % len(kinds)]
         pads, session = self.perfect_pads(len(seeds)), sessions.Session.of(self, len(seeds))
         truth = np.empty((len(seeds), SENSORS)), np.empty(len(seeds)), self.made("twin_seat", len(seeds), SENSORS)
-        found = (session.found, session.sensors, session.own)
+        found = (session.found, session.sensors, session.deviations)
         self.call("pad_calibrated", kinds, sessions.LAYER_mm, self.contact_tables, seeds, *found, *truth)
         pads["gain"], pads["gain_sd"] = truth[0] / session.sensors["gain"], session.sensors["reading_sd"]
-        pads["own"], pads["cast_dip_share"], pads["seat"] = session.own, *truth[1:]
+        pads["deviations"], pads["cast_dip_share"], pads["seat"] = session.deviations, *truth[1:]
         for name in ("dip_share", "dip_sd_mm"):
             pads[name] = session.found[name]
         return pads
@@ -142,10 +142,10 @@ class Contacts(Measure):
         of_pads = {name: pads[name] for name in ("gain_sd", "dip_share", "dip_sd_mm")}
         return self.settings(len(pads), noise_Pa=noise_Pa, clip_below_sds=0, **of_pads)
 
-    def own_of(self, pads):
+    def deviations_of(self, pads):
         """None where no calibration has found any."""
-        own = np.ascontiguousarray(pads["own"])
-        return own if np.any(own.view(np.int32)) else None
+        deviations = np.ascontiguousarray(pads["deviations"])
+        return deviations if np.any(deviations.view(np.int32)) else None
 
     def readings_Pa(self, base_Pa, pads, noise_Pa, normals):
         """[touch, frame, sensor] of pads [touch]."""
@@ -157,8 +157,8 @@ class Contacts(Measure):
         frame has a fit."""
         readings_Pa = self.readings_Pa(base_Pa, pads, noise_Pa, normals)
         saturated = ((readings_Pa > self.max_pressure_Pa - AMBIENT_Pa) << np.arange(SENSORS)).sum(axis=2).astype(np.uint64)
-        settings, own = self.settings_of(pads, noise_Pa), self.own_of(pads)
-        fits, estimates = self.tangential(self.own_array, profile, settings, q10(readings_Pa), usable, saturated, own=own)
+        settings, deviations = self.settings_of(pads, noise_Pa), self.deviations_of(pads)
+        fits, estimates = self.tangential(self.own_array, profile, settings, q10(readings_Pa), usable, saturated, deviations=deviations)
         exact = profile.view(f"V{profile.itemsize}").copy().view(profile.dtype)  # with the pad's ends, which are no fields of the record
         exact["tangential_scale_sd"] = 0.0
         published, last = self.made("published", len(base_Pa)), (np.ascontiguousarray(each[:, -1]) for each in (fits, estimates))
@@ -171,12 +171,12 @@ class Contacts(Measure):
         """(fit_shapes_result, shapes_location), each [touch, first or last], of contacts [touch, frame, sensor]."""
         pad = self.made("fit_shapes_pad", 1)
         self.call("shapes_pad", self.own_array, profile, pad)
-        own = self.own_of(pads)
+        deviations = self.deviations_of(pads)
         found = self.made("fit_shapes_result", len(readings_Pa), 2), self.made("shapes_location", len(readings_Pa), 2)
         settings = self.settings_of(pads, noise_Pa)
         settings["hysteresis_sd_Pa_q10"][:, :SENSORS] = q10(hysteresis_sd_Pa)
         readings = q10(readings_Pa), self.usable(readings_Pa), published
-        self.call("held_shapes", self.own_array, pad, settings, self.no_own if own is None else own, *readings, *found)
+        self.call("held_shapes", self.own_array, pad, settings, deviations, *readings, *found)
         return found
 
     def motion_flags(self, ends, t_us, readings_Pa, pads, noise_Pa, pressed, profile):

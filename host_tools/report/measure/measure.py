@@ -18,7 +18,7 @@ class Measure(Firmware):
     def contact_tables(self):
         return self.build / "contact_tables"
 
-    def chain(self, array, settings, frames, *, before=None, gains=None, own=None, contacts=None):
+    def chain(self, array, settings, frames, *, before=None, gains=None, deviations=None, contacts=None):
         """(conditioned, fit_result, contact_result), each [run, frame], of frames through condition, fit and contact. Every run begins after the frames
         `before`."""
         if contacts is None:
@@ -31,7 +31,7 @@ class Measure(Firmware):
             "chain",
             array,
             settings,
-            self.no_own if own is None else own,
+            deviations,
             contacts,
             none if gains is None else gains,
             before,

@@ -101,8 +101,8 @@ MEASURE_ENTRY(pad_placements)
 // Sessions of at most `planned` placements as the tool leads them.
 static void pad_lead(std::string session_kind, Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache,
                      Batch<const std::int64_t, 1> seeds, std::int64_t planned, Batch<calibration, 1> found,
-                     Batch<calibrated_sensor, 2> sensors, Batch<fit_deviation, 2> own, Batch<std::int64_t, 1> placements) {
-  same_length(seeds, found, sensors, own, placements);
+                     Batch<calibrated_sensor, 2> sensors, Batch<fit_deviation, 2> deviations, Batch<std::int64_t, 1> placements) {
+  same_length(seeds, found, sensors, deviations, placements);
   const Pads pads{kinds, layer_mm, cache, seeds};
   const Feet &feet = pads.feet();
   pads.each([&](std::size_t i) {
@@ -110,7 +110,7 @@ static void pad_lead(std::string session_kind, Batch<const pad_kind, 1> kinds, d
     Session session(feet, kind_named(session_kind), pads.seed(i), static_cast<std::size_t>(planned));
     std::vector<Placement> made;
     const Judgement judgement = lead(session, pad, made);
-    describe(session_array(), made, judgement, WEIGHT_N, found[i], sensors.row(i), own.row(i));
+    describe(session_array(), made, judgement, WEIGHT_N, found[i], sensors.row(i), deviations.row(i));
     placements[i] = static_cast<std::int64_t>(made.size());
   });
 }
@@ -153,9 +153,9 @@ MEASURE_ENTRY(pad_gains)
 // What accepted calibrations found: sessions of thirty placements on pads of their own, each repeated on another pad
 // until a calibration is accepted. true_gain, true_dip_share and seats are how that pad is.
 static void pad_calibrated(Batch<const pad_kind, 1> kinds, double layer_mm, std::string cache, Batch<const std::int64_t, 1> seeds,
-                           Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors, Batch<fit_deviation, 2> own,
+                           Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors, Batch<fit_deviation, 2> deviations,
                            Batch<double, 2> true_gain, Batch<double, 1> true_dip_share, Batch<twin::Pad::Seat, 2> seats) {
-  same_length(seeds, found, sensors, own, true_gain, true_dip_share, seats);
+  same_length(seeds, found, sensors, deviations, true_gain, true_dip_share, seats);
   const Pads pads{kinds, layer_mm, cache, seeds};
   const Feet &feet = pads.feet();
   // Whether the calibration is accepted.
@@ -172,7 +172,7 @@ static void pad_calibrated(Batch<const pad_kind, 1> kinds, double layer_mm, std:
       if (judgement.state == Judgement::State::refused) {
         break;
       }
-      describe(session_array(), placements, judgement, WEIGHT_N, found[i], sensors.row(i), own.row(i));
+      describe(session_array(), placements, judgement, WEIGHT_N, found[i], sensors.row(i), deviations.row(i));
       if (judgement.state == Judgement::State::good && found[i].force_scale > 0.0) {
         const std::vector<double> gains = pad.settled_gains();
         std::copy(gains.begin(), gains.end(), true_gain.row(i));

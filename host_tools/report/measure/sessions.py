@@ -49,7 +49,7 @@ class Session:
 
     found: np.ndarray
     sensors: np.ndarray
-    own: np.ndarray
+    deviations: np.ndarray
 
     @classmethod
     def of(cls, firmware, count):
@@ -60,7 +60,7 @@ class Session:
         )
 
     def where(self, chosen):
-        return Session(self.found[chosen], self.sensors[chosen], self.own[chosen])
+        return Session(self.found[chosen], self.sensors[chosen], self.deviations[chosen])
 
 
 @dataclasses.dataclass
@@ -92,7 +92,9 @@ def placements(firmware, session, of, seeds, layer_mm, count):
 def led(firmware, session, of, seeds, layer_mm, planned):
     """Sessions as the tool leads them, and how many placements each needed."""
     made, needed = Session.of(firmware, len(seeds)), np.zeros(len(seeds), np.int64)
-    firmware.call("pad_lead", session, of, layer_mm, firmware.contact_tables, seeds, planned, made.found, made.sensors, made.own, needed)
+    firmware.call(
+        "pad_lead", session, of, layer_mm, firmware.contact_tables, seeds, planned, made.found, made.sensors, made.deviations, needed
+    )
     return made, needed
 
 

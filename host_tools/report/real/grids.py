@@ -124,12 +124,12 @@ class Fingertip:
         return fingertip.fit(reading_Pa, self.pad, calibration=response, noise_Pa=NOISE_PA)
 
     def inputs(self, reading_Pa, response=None, **fields):
-        """What the fit gets of these: fit_array, settings, readings, bitmap of usable sensors, own."""
+        """What the fit gets of these: fit_array, settings, readings, bitmap of usable sensors, deviations."""
         return inputs(self.measure, read_pad(self.pad), reading_Pa, response, NOISE_PA, **fields)
 
     def us(self, several):
         """Microseconds of one fit of each of several inputs, in the quickest of PASSES passes in which they take turns."""
-        return np.min([[self.measure.timed_fit(*one[:4], own=one[4])[1] for one in several] for _ in range(PASSES)], axis=0)
+        return np.min([[self.measure.timed_fit(*one[:4], deviations=one[4])[1] for one in several] for _ in range(PASSES)], axis=0)
 
 
 @dataclasses.dataclass
@@ -138,7 +138,7 @@ class Calibration:
 
     found: np.void
     sensors: np.ndarray
-    own: np.ndarray
+    deviations: np.ndarray
 
     @property
     def good(self):

@@ -23,8 +23,8 @@ def rows(presses, measured):
         keys = [(way, iterations) for way in ways for iterations in ITERATIONS]
         us = dict(zip(keys, fingertip.us([fingertip.inputs(readings, iterations=iterations, **ways[way]) for way, iterations in keys])))
         for way, iterations in keys:
-            *of, own = fingertip.inputs(readings, iterations=iterations, **ways[way])
-            fits = fingertip.measure.fit_held(*of, own=own)
+            *of, deviations = fingertip.inputs(readings, iterations=iterations, **ways[way])
+            fits = fingertip.measure.fit_held(*of, deviations=deviations)
             error_mm.setdefault((way, iterations), []).append(grids.Errors(fits, xy_mm).error_mm)
             run_time.setdefault((way, iterations), []).append(us[way, iterations] / us["published", PUBLISHED_ITERATIONS])
     return [

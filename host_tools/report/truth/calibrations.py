@@ -49,16 +49,16 @@ class Taps:
         self.firmware = firmware
         self.x_mm, self.y_mm, self.force_N, self.reading_Pa = sessions.taps(firmware, kinds, seeds, layer_mm, TAPS)
 
-    def estimates(self, gain, gain_sd, found=None, own=None):
-        """Distances from the truth, estimated over true force, and warnings, [pad][tap]. found, own: what the calibration found beside the gains."""
+    def estimates(self, gain, gain_sd, found=None, deviations=None):
+        """Distances from the truth, estimated over true force, and warnings, [pad][tap]. found, deviations: what the calibration found beside the gains."""
         distance_mm, force, warned = (np.zeros(self.x_mm.shape) for _ in range(3))
         for pad, readings in enumerate(self.reading_Pa):
             settings = self.firmware.settings(noise_Pa=NOISE_Pa, gain_sd=gain_sd[pad])
             for name in ("prior_sigma_mm", "prior_width_mm", "dip_share", "dip_sd_mm") if found is not None else ():
                 settings[name] = found[name][pad]
-            of_pad = own[pad : pad + 1] if own is not None and found["has_own"][pad] else None
+            of_pad = deviations[pad : pad + 1] if deviations is not None and found["has_deviations"][pad] else None
             pressure = q10(readings / gain[pad])
-            fits = self.firmware.fit_held(self.firmware.array(), settings, pressure, own=of_pad)
+            fits = self.firmware.fit_held(self.firmware.array(), settings, pressure, deviations=of_pad)
             distance_mm[pad] = np.hypot(fits["x_mm"] - self.x_mm[pad], fits["y_mm"] - self.y_mm[pad])
             force[pad] = fits["force_N"] / self.force_N[pad]
             warned[pad] = fits["flags"] & WARNINGS > 0
@@ -69,7 +69,7 @@ class Taps:
         return self.estimates(np.ones(sensors), np.full(sensors, RAW_GAIN_SD))
 
     def after(self, session):
-        return self.estimates(session.sensors["gain"], session.sensors["reading_sd"], session.found, session.own)
+        return self.estimates(session.sensors["gain"], session.sensors["reading_sd"], session.found, session.deviations)
 
 
 def medians(distances_mm):

@@ -10,16 +10,16 @@
 using namespace fingertip::calibrating;
 using namespace fingertip::measure;
 
-MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(text), FIELD(solved), FIELD(has_own), FIELD(width_mm), FIELD(residual_share),
-               FIELD(sigma_sd_mm), FIELD(dip), FIELD(dip_sd), FIELD(position_mm), FIELD(halves_shape), FIELD(halves_gauge),
-               FIELD(force_scale), FIELD(force_scale_sd), FIELD(prior_sigma_mm), FIELD(prior_width_mm), FIELD(dip_share), FIELD(dip_sd_mm),
-               FIELD(worst_shape_sd), FIELD(force_share), FIELD(ellipse), FIELD(offset_share), FIELD(drift_share), FIELD(slope),
-               FIELD(wanted_x_mm), FIELD(wanted_y_mm))
+MEASURE_RECORD(calibration, FIELD(state), FIELD(reason), FIELD(text), FIELD(solved), FIELD(has_deviations), FIELD(width_mm),
+               FIELD(residual_share), FIELD(sigma_sd_mm), FIELD(dip), FIELD(dip_sd), FIELD(position_mm), FIELD(halves_shape),
+               FIELD(halves_gauge), FIELD(force_scale), FIELD(force_scale_sd), FIELD(prior_sigma_mm), FIELD(prior_width_mm),
+               FIELD(dip_share), FIELD(dip_sd_mm), FIELD(worst_shape_sd), FIELD(force_share), FIELD(ellipse), FIELD(offset_share),
+               FIELD(drift_share), FIELD(slope), FIELD(wanted_x_mm), FIELD(wanted_y_mm))
 
 MEASURE_RECORD(calibrated_sensor, FIELD(gain), FIELD(gain_sd), FIELD(reading_sd), FIELD(off_x_mm), FIELD(off_y_mm), FIELD(wider))
 
 void fingertip::measure::describe(const Array &layout, const std::vector<Placement> &placements, const Judgement &judgement, double force_N,
-                                  calibration &found, calibrated_sensor *sensors, fit_deviation *own) {
+                                  calibration &found, calibrated_sensor *sensors, fit_deviation *deviations) {
   const Solution &solution = judgement.solution, &stored = judgement.kept;
   const Shape shape = shape_of(stored);
   found = {};
@@ -49,28 +49,28 @@ void fingertip::measure::describe(const Array &layout, const std::vector<Placeme
     found.force_scale = scale->scale;
     found.force_scale_sd = scale->sd;
   }
-  const std::vector<fit_deviation> kept = own_of(layout, shape);
-  found.has_own = !kept.empty();
-  std::fill_n(own, layout.sensors(), fit_deviation{});
-  std::copy(kept.begin(), kept.end(), own);
+  const std::vector<fit_deviation> kept = deviations_of(layout, shape);
+  found.has_deviations = !kept.empty();
+  std::fill_n(deviations, layout.sensors(), fit_deviation{});
+  std::copy(kept.begin(), kept.end(), deviations);
   for (std::size_t k = 0; k < layout.sensors(); k++) {
     const auto at = [&](const std::vector<double> &values) { return k < values.size() ? values[k] : 0.0; };
-    const Own sensor = k < shape.own.size() ? shape.own[k] : Own{};
+    const Deviation sensor = k < shape.deviations.size() ? shape.deviations[k] : Deviation{};
     sensors[k] = {at(stored.gain), at(stored.gain_sd), at(stored.reading_sd), sensor.off_x_mm, sensor.off_y_mm, sensor.wider};
   }
 }
 
 // Sessions [session][placement][sensor]; a sensor whose reading is not a number has none. last: no placement follows.
-// force_N: of each placement. fading: share of the readings that each loses in half a second, or none. own
+// force_N: of each placement. fading: share of the readings that each loses in half a second, or none. deviations
 // [session][sensor]: zeros unless the session found it.
 static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, double pitch_mm, double noise_Pa, double force_N,
                       std::int64_t last, Batch<const double, 2> t_s, Batch<const double, 3> reading_Pa, Batch<const double, 2> fading,
-                      Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors, Batch<fit_deviation, 2> own) {
+                      Batch<calibration, 1> found, Batch<calibrated_sensor, 2> sensors, Batch<fit_deviation, 2> deviations) {
   same_length(x_mm, y_mm);
-  same_length(found, t_s, reading_Pa, sensors, own);
+  same_length(found, t_s, reading_Pa, sensors, deviations);
   require(fading.size() == 0 || (fading.size() == found.size() && fading.size(1) == t_s.size(1)), "other fadings");
   const std::size_t count = x_mm.size(), placements_of_each = reading_Pa.size(1);
-  require(reading_Pa.size(2) == count && sensors.size(1) == count && own.size(1) == count && t_s.size(1) == placements_of_each,
+  require(reading_Pa.size(2) == count && sensors.size(1) == count && deviations.size(1) == count && t_s.size(1) == placements_of_each,
           "arrays of another number of sensors or placements");
   const Array layout{pitch_mm, {x_mm.data, x_mm.data + count}, {y_mm.data, y_mm.data + count}};
   check_places(layout);
@@ -89,7 +89,7 @@ static void calibrate(Batch<const double, 1> x_mm, Batch<const double, 1> y_mm, 
       }
     }
     const Judgement judgement = judge(layout, placements, last != 0);
-    describe(layout, placements, judgement, force_N, found[session], sensors.row(session), own.row(session));
+    describe(layout, placements, judgement, force_N, found[session], sensors.row(session), deviations.row(session));
     const Wanted wanted = next_place(layout, placements, judgement.solution);
     found[session].wanted_x_mm = wanted.x_mm;
     found[session].wanted_y_mm = wanted.y_mm;

@@ -17,7 +17,7 @@ struct calibration {
   std::int32_t state;         // 0: more, 1: good, 2: refused
   char reason[16], text[512]; // text: a sentence, why and what to do
   bool solved;
-  bool has_own; // the tool would keep `own`
+  bool has_deviations; // the tool would keep `deviations`
   double width_mm, residual_share;
   double prior_sigma_mm, prior_width_mm, dip_share, dip_sd_mm; // as fit_settings has them
   double sigma_sd_mm, dip, dip_sd, position_mm, halves_shape, halves_gauge;
@@ -31,8 +31,9 @@ struct calibrated_sensor {
   double off_x_mm, off_y_mm, wider;
 };
 
-// sensors, own: [sensor]; own is zeros unless has_own. force_N: of each placement.
+// sensors, deviations: [sensor]; deviations is zeros unless has_deviations. force_N: of each placement.
 void describe(const calibrating::Array &layout, const std::vector<calibrating::Placement> &placements,
-              const calibrating::Judgement &judgement, double force_N, calibration &found, calibrated_sensor *sensors, fit_deviation *own);
+              const calibrating::Judgement &judgement, double force_N, calibration &found, calibrated_sensor *sensors,
+              fit_deviation *deviations);
 
 } // namespace fingertip::measure

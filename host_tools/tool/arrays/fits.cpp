@@ -68,9 +68,9 @@ static Kernel kernel_named(const std::string &name) {
 // kernel: "grid", "masked", "general", "fit" (fit_gaussian) or "fit_grid" (fit_gaussian_grid). us: of one fit, if a
 // single thread runs them.
 static void fit(std::string kernel, std::int64_t threads, Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings,
-                Batch<const fit_deviation, 2> own, Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const sensor_map, 1> usable,
+                Batch<const fit_deviation, 2> deviations, Batch<const std::int32_t, 2> pressure_Pa_q10, Batch<const sensor_map, 1> usable,
                 Batch<fit_result, 1> results, Batch<double, 1> us) {
-  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(1), own);
+  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(1), deviations);
   same_length(results, pressure_Pa_q10, usable);
   length_or_one(results, all_settings);
   const Kernel run = kernel_named(kernel);
@@ -78,7 +78,7 @@ static void fit(std::string kernel, std::int64_t threads, Batch<const fit_array,
   in_parallel(
       results.size(),
       [&](std::size_t press) {
-        const fit_settings settings = settings_of(all_settings, own, press);
+        const fit_settings settings = settings_of(all_settings, deviations, press);
         run(array, pressure_Pa_q10.row(press), usable[press], &settings, results.row(press));
       },
       static_cast<std::size_t>(threads));
@@ -88,15 +88,15 @@ MEASURE_ENTRY(fit)
 
 // Fit of held presses [press][frame][sensor]: that of the last frame, with what the search for a tangential force that
 // is not estimated has found in the frames before. A single frame is not searched.
-static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_deviation, 2> own,
+static void fit_held(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_deviation, 2> deviations,
                      Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable, Batch<fit_result, 1> results) {
-  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
+  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), deviations);
   same_length(results, pressure_Pa_q10, usable);
   length_or_one(results, all_settings);
   const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
   require(usable.size(1) == frames, "other numbers of frames");
   in_parallel(results.size(), [&](std::size_t press) {
-    const fit_settings settings = settings_of(all_settings, own, press);
+    const fit_settings settings = settings_of(all_settings, deviations, press);
     const std::int32_t *pressure = pressure_Pa_q10.row(press);
     fit_gaussian(array, pressure, usable.row(press)[0], &settings, &results[press]);
     fit_bias bias{};

@@ -63,11 +63,11 @@ MEASURE_ENTRY(default_contact_settings)
 
 // frames [run][frame] through condition, fit and contact, as the firmware's main loop does it. Every run begins after
 // the frames `before`; the noise is that of each frame. gains: one, or none for sensors that are alike.
-static void chain(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_deviation, 2> own,
+static void chain(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1> all_settings, Batch<const fit_deviation, 2> deviations,
                   Batch<const contact_settings, 1> contacts, Batch<const condition_gains, 1> gains, Batch<const frame, 1> before,
                   Batch<const frame, 2> frames, Batch<conditioned, 2> readings, Batch<fit_result, 2> fits,
                   Batch<contact_result, 2> results) {
-  const fit_array *const array = &checked(arrays, arrays[0].sensor_count, own);
+  const fit_array *const array = &checked(arrays, arrays[0].sensor_count, deviations);
   same_length(frames, readings, fits, results);
   length_or_one(frames, all_settings, contacts);
   require(frames.size(1) == readings.size(1) && frames.size(1) == fits.size(1) && frames.size(1) == results.size(1),
@@ -83,7 +83,7 @@ static void chain(Batch<const fit_array, 1> arrays, Batch<const fit_settings, 1>
   in_parallel(frames.size(), [&](std::size_t run) {
     condition state = start;
     slip_history history{};
-    fit_settings settings = settings_of(all_settings, own, run);
+    fit_settings settings = settings_of(all_settings, deviations, run);
     for (std::size_t i = 0; i < frames.size(1); i++) {
       const frame &taken = frames.row(run)[i];
       conditioned &reading = readings.row(run)[i];
@@ -139,16 +139,17 @@ MEASURE_ENTRY(shapes_pad)
 // Fit and tangential estimate of contacts [contact][frame][sensor], each from its first frame on; saturated: bitmap of the sensors that are
 // left out, usable of those that are not missing. Frames whose fit is not worthwhile have no estimate, and the one after begins again.
 static void tangential(Batch<const fit_array, 1> arrays, Batch<const fit_pad, 1> pads, Batch<const fit_settings, 1> all_settings,
-                       Batch<const fit_deviation, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable,
-                       Batch<const sensor_map, 2> saturated, Batch<fit_result, 2> fits, Batch<fit_tangential, 2> results) {
-  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
+                       Batch<const fit_deviation, 2> deviations, Batch<const std::int32_t, 3> pressure_Pa_q10,
+                       Batch<const sensor_map, 2> usable, Batch<const sensor_map, 2> saturated, Batch<fit_result, 2> fits,
+                       Batch<fit_tangential, 2> results) {
+  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), deviations);
   same_length(results, fits, pressure_Pa_q10, usable, saturated);
   length_or_one(results, all_settings, pads);
   require(results.size(1) == pressure_Pa_q10.size(1) && results.size(1) == fits.size(1) && results.size(1) == usable.size(1) &&
               results.size(1) == saturated.size(1),
           "other numbers of frames");
   in_parallel(results.size(), [&](std::size_t contact) {
-    const fit_settings settings = settings_of(all_settings, own, contact);
+    const fit_settings settings = settings_of(all_settings, deviations, contact);
     const auto pad = std::make_unique<fit_pad>(*pads.row_or_all(contact));
     fit_tangential_state state{};
     for (std::size_t i = 0; i < results.size(1); i++) {

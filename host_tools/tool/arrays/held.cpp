@@ -95,9 +95,10 @@ MEASURE_RECORD(shapes_location, FIELD(x_mm), FIELD(y_mm), FIELD(location_sd_mm))
 // The shapes, as scene grasp has them, of contacts [contact][frame][sensor] that are held: after FIT_SHAPES_FRAMES
 // frames the first answer, and the last. Where the tangential force is estimated, its location is used.
 static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes_pad, 1> pad, Batch<const fit_settings, 1> all_settings,
-                        Batch<const fit_deviation, 2> own, Batch<const std::int32_t, 3> pressure_Pa_q10, Batch<const sensor_map, 2> usable,
-                        Batch<const published, 1> estimates, Batch<fit_shapes_result, 2> results, Batch<shapes_location, 2> places) {
-  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), own);
+                        Batch<const fit_deviation, 2> deviations, Batch<const std::int32_t, 3> pressure_Pa_q10,
+                        Batch<const sensor_map, 2> usable, Batch<const published, 1> estimates, Batch<fit_shapes_result, 2> results,
+                        Batch<shapes_location, 2> places) {
+  const fit_array *const array = &checked(arrays, pressure_Pa_q10.size(2), deviations);
   const std::size_t frames = pressure_Pa_q10.size(1), sensors = pressure_Pa_q10.size(2);
   same_length(results, places, pressure_Pa_q10, usable, estimates);
   require(results.size(1) == 2 && places.size(1) == 2 && frames > FIT_SHAPES_FRAMES && usable.size(1) == frames,
@@ -108,7 +109,7 @@ static void held_shapes(Batch<const fit_array, 1> arrays, Batch<const fit_shapes
     job->pad = pad[0];
     auto &question = job->question;
     question.parts = FIT_SHAPES_PARTS;
-    question.settings = settings_of(all_settings, own, contact);
+    question.settings = settings_of(all_settings, deviations, contact);
     const published &estimate = estimates[contact];
     tangential_force load{};
     load.x_mm = static_cast<float>(estimate.x_mm);

@@ -151,8 +151,8 @@ Solution in_part(Solution solution, bool gains) {
   solution.reading_sd.assign(solution.gain.size(), PART_SD);
   if (!gains) {
     solution.gain.assign(solution.gain.size(), 1.0);
-    for (std::vector<double> *own : {&solution.dx_mm, &solution.dy_mm, &solution.own_width}) {
-      own->assign(own->size(), 0.0);
+    for (std::vector<double> *each : {&solution.dx_mm, &solution.dy_mm, &solution.own_width}) {
+      each->assign(each->size(), 0.0);
     }
   }
   return solution;
@@ -309,7 +309,7 @@ Evidence against(const Judgement &j) {
 
 /* The firmware's fit to a placement. */
 struct FirmwareFit {
-  FirmwareFit(const Array &array, const Shape &shape) : own(own_of(array, shape)) {
+  FirmwareFit(const Array &array, const Shape &shape) : deviations(deviations_of(array, shape)) {
     std::vector<float> x, y;
     for (std::size_t k = 0; k < array.sensors(); k++) {
       x.push_back(static_cast<float>(array.x_mm[k]));
@@ -324,7 +324,7 @@ struct FirmwareFit {
     settings.prior_width_mm = static_cast<float>(shape.sigma_sd_mm);
     settings.dip_share = static_cast<float>(shape.dip_share);
     settings.dip_sd_mm = static_cast<float>(shape.dip_sd_mm);
-    settings.deviations = own.empty() ? nullptr : own.data();
+    settings.deviations = deviations.empty() ? nullptr : deviations.data();
   }
   std::optional<fit_result> operator()(const Placement &placement, const std::vector<double> &gain) {
     std::int32_t pressure[FT_MAX_SENSORS] = {};
@@ -343,7 +343,7 @@ struct FirmwareFit {
   /* The firmware's own settings (config/defaults.h), without a pad profile; a mean of many frames has hardly any noise. */
   static constexpr std::uint8_t ITERATIONS = 4, CLIP_BELOW_SDS = 4;
   static constexpr std::int32_t NOISE_Pa_Q10 = 1024;
-  std::vector<fit_deviation> own;
+  std::vector<fit_deviation> deviations;
   fit_array of{};
   fit_settings settings{};
   bool usable_array = false;
@@ -469,7 +469,7 @@ Shape shape_of(const Solution &solution) {
   Shape shape{solution.sigma_mm, std::hypot(solution.sigma_sd_mm, CONTACTS_SD_mm2 / (2.0 * solution.sigma_mm)), solution.dip_share,
               solution.dip_sd_mm};
   for (std::size_t k = 0; k < solution.own_width.size(); k++) {
-    shape.own.push_back({solution.dx_mm[k], solution.dy_mm[k], solution.own_width[k]});
+    shape.deviations.push_back({solution.dx_mm[k], solution.dy_mm[k], solution.own_width[k]});
   }
   return shape;
 }
@@ -479,11 +479,11 @@ Shape without_width(Shape shape) {
   return shape;
 }
 
-std::vector<fit_deviation> own_of(const Array &array, const Shape &shape) {
+std::vector<fit_deviation> deviations_of(const Array &array, const Shape &shape) {
   const auto q15 = [](double value) { return static_cast<std::int32_t>(std::lround(std::clamp(32768.0 * value, -32767.0, 32767.0))); };
   std::vector<fit_deviation> made;
-  for (const Own &own : shape.own) {
-    made.push_back({q15(own.off_x_mm / array.pitch_mm), q15(own.off_y_mm / array.pitch_mm), q15(own.wider)});
+  for (const Deviation &each : shape.deviations) {
+    made.push_back({q15(each.off_x_mm / array.pitch_mm), q15(each.off_y_mm / array.pitch_mm), q15(each.wider)});
   }
   return made;
 }

@@ -93,20 +93,20 @@ struct Judgement {
 Judgement judge(const Array &array, std::vector<Placement> placements, bool last);
 
 /* How far a sensor is from its place, and the log of the width of its response over that of the others. */
-struct Own {
+struct Deviation {
   double off_x_mm = 0.0, off_y_mm = 0.0, wider = 0.0;
 };
 /* What the fingertip's fit gets of the pad's response, see fit.h; zeros: nothing. */
 struct Shape {
   double sigma_mm = 0.0, sigma_sd_mm = 0.0; /* a prior */
   double dip_share = 0.0, dip_sd_mm = 0.0;
-  std::vector<Own> own = {}; /* [sensor] */
+  std::vector<Deviation> deviations = {}; /* [sensor] */
 };
 Shape shape_of(const Solution &solution);
 /* The part of it that the firmware's fit uses with a pad profile: no width. */
 Shape without_width(Shape shape);
 /* The shape in the form of the fit: [sensor], or nothing. */
-std::vector<fit_deviation> own_of(const Array &array, const Shape &shape);
+std::vector<fit_deviation> deviations_of(const Array &array, const Shape &shape);
 
 /* Force over 2 pi p0 sigma^2 of the firmware's own fit to the readings over their gains, half a
  * second to a second after the weight was down. Rubber that relaxes reads more before and less
