@@ -19,7 +19,7 @@ constexpr std::int64_t LAST_WORD_us = 500000;
 // News that wait: ten seconds of two fingertips at 1308 frames a second, and the steps.
 constexpr std::size_t MOST_NEWS = 80000;
 
-GraspLoop::GraspLoop(const std::array<Way, FINGERS> &ways, Options options) : options_(std::move(options)) {
+GraspLoop::GraspLoop(const std::array<Endpoint, FINGERS> &ways, Options options) : options_(std::move(options)) {
   DeviceLoop::Options wanted;
   wanted.streams = options_.streams;
   wanted.follow_clock = true;
@@ -36,16 +36,16 @@ GraspLoop::~GraspLoop() {
   }
 }
 
-std::array<DeviceNews, GraspLoop::FINGERS> GraspLoop::meet(const std::function<bool()> &stop) {
-  std::array<std::optional<DeviceNews>, FINGERS> ready;
+std::array<DeviceUpdate, GraspLoop::FINGERS> GraspLoop::meet(const std::function<bool()> &stop) {
+  std::array<std::optional<DeviceUpdate>, FINGERS> ready;
   while (!ready[0] || !ready[1]) {
     if (stop()) {
       throw Interrupted();
     }
-    for (DeviceNews &news : feed_.take(milliseconds(20))) {
-      if (news.kind == DeviceNews::Kind::ready) {
+    for (DeviceUpdate &news : feed_.take(milliseconds(20))) {
+      if (news.kind == DeviceUpdate::Kind::ready) {
         ready[news.device] = std::move(news);
-      } else if (news.kind == DeviceNews::Kind::ended) {
+      } else if (news.kind == DeviceUpdate::Kind::ended) {
         loops_[news.device]->rethrow();
         throw Interrupted();
       }
@@ -118,14 +118,14 @@ void GraspLoop::run() {
 }
 
 void GraspLoop::take_devices() {
-  for (DeviceNews &news : feed_.take(STEP)) {
-    if (news.kind == DeviceNews::Kind::packet && news.packet.type == WIRE_CONTACT) {
+  for (DeviceUpdate &news : feed_.take(STEP)) {
+    if (news.kind == DeviceUpdate::Kind::packet && news.packet.type == WIRE_CONTACT) {
       const double now_us = static_cast<double>(steady_now_us());
       const GripTouch touch = touch_from_packet(news.packet, std::min(news.host_us, now_us));
       std::lock_guard lock(core_mutex_);
       core_->take(news.device, touch);
     }
-    running_ -= news.kind == DeviceNews::Kind::ended;
+    running_ -= news.kind == DeviceUpdate::Kind::ended;
     put({Kind::device, steady_now_us(), std::move(news)});
   }
 }

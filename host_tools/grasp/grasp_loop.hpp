@@ -47,7 +47,7 @@ struct GraspNews {
   };
   Kind kind;
   std::int64_t host_us = 0;
-  std::optional<DeviceNews> device = {};
+  std::optional<DeviceUpdate> device = {};
   GripCommand command = {};
   GripReport report = {};
   std::optional<GripperStatus> status = {}; // the newest answer
@@ -68,7 +68,7 @@ public:
   };
 
   // Opens both ports; the left is 0. Throws Error.
-  GraspLoop(const std::array<Way, FINGERS> &ways, Options options);
+  GraspLoop(const std::array<Endpoint, FINGERS> &ways, Options options);
   // Ends it as end() does, but does not wait.
   ~GraspLoop();
   GraspLoop(const GraspLoop &) = delete;
@@ -80,7 +80,7 @@ public:
   double read_until_us() const { return std::min(loops_[0]->read_until_us(), loops_[1]->read_until_us()); }
 
   // Their news of kind ready, once both have answered. Throws Error, and Interrupted once stop reports so.
-  std::array<DeviceNews, FINGERS> meet(const std::function<bool()> &stop);
+  std::array<DeviceUpdate, FINGERS> meet(const std::function<bool()> &stop);
 
   // Fingertips stream, the core steps; nothing moves before it is requested. Throws Error where the gripper does not answer.
   void begin(std::unique_ptr<Gripper> gripper, OpenGripper reopen, const GripSettings &settings);

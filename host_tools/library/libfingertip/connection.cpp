@@ -19,18 +19,18 @@ static const Found *with_serial(const std::vector<Found> &found, const std::stri
 }
 
 /* Of the fingertip there. */
-static std::string serial_of(const Way &way, const std::string &root) {
+static std::string serial_of(const Endpoint &endpoint, const std::string &root) {
   return text_field(ask(
-                        way, [] { return false; }, root)
+                        endpoint, [] { return false; }, root)
                         .serial);
 }
 
 /* Throws Error where there is none. */
-static Way sure_way_to(const Found &found, Reach reach) {
-  if (auto way = way_to(found, reach)) {
-    return *way;
+static Endpoint sure_endpoint_of(const Found &found, TransportKind kind) {
+  if (auto endpoint = endpoint_of(found, kind)) {
+    return *endpoint;
   }
-  if (reach == Reach::socket) {
+  if (kind == TransportKind::socket) {
     throw Error(ErrorCode::not_shared, (found.serial.empty() ? found.port : found.serial) + ": no program shares it");
   }
   throw Error(ErrorCode::no_driver, found.serial + ": has no serial port: its driver cdc_acm is not "
@@ -38,13 +38,13 @@ static Way sure_way_to(const Found &found, Reach reach) {
 }
 
 /* Its serial number, or its port if that is unknown. */
-static std::string name_of(const Found &found, Reach reach, const std::string &root) {
+static std::string name_of(const Found &found, TransportKind kind, const std::string &root) {
   if (!found.serial.empty()) {
     return found.serial;
   }
   try {
-    if (auto way = way_to(found, reach)) {
-      return serial_of(*way, root) + " (" + found.port + ")";
+    if (auto endpoint = endpoint_of(found, kind)) {
+      return serial_of(*endpoint, root) + " (" + found.port + ")";
     }
   } catch (const Error &) {
     /* the port has to do */
@@ -52,43 +52,43 @@ static std::string name_of(const Found &found, Reach reach, const std::string &r
   return found.port;
 }
 
-static Way only_one(const std::vector<Found> &found, Reach reach, const std::string &root, const std::string &none) {
+static Endpoint only_one(const std::vector<Found> &found, TransportKind kind, const std::string &root, const std::string &none) {
   if (found.empty()) {
     const std::string boot_rom = find_boot_rom(root);
     throw Error(ErrorCode::no_fingertip, none + (boot_rom.empty() ? "" : ", but " + boot_rom));
   }
   if (found.size() > 1) {
     throw Error(ErrorCode::several_fingertips,
-                "several fingertips found: " + joined(found, ", ", [&](const Found &each) { return name_of(each, reach, root); }));
+                "several fingertips found: " + joined(found, ", ", [&](const Found &each) { return name_of(each, kind, root); }));
   }
-  return sure_way_to(found[0], reach);
+  return sure_endpoint_of(found[0], kind);
 }
 
-static Way with_wanted_serial(const Choice &choice, const std::string &root) {
-  Finds finds = find_fingertips(root);
-  if (const Found *found = with_serial(finds.here, choice.device)) {
-    return sure_way_to(*found, choice.reach);
+static Endpoint with_wanted_serial(const Choice &choice, const std::string &root) {
+  FoundDevices devices = find_fingertips(root);
+  if (const Found *found = with_serial(devices.here, choice.device)) {
+    return sure_endpoint_of(*found, choice.transport);
   }
   std::string others;
   std::string unasked;
-  for (const Found &found : finds.here) {
+  for (const Found &found : devices.here) {
     others += " " + found.serial;
   }
-  for (const Found &found : finds.in_environment) {
-    auto way = way_to(found, choice.reach);
-    if (!way) {
+  for (const Found &found : devices.in_environment) {
+    auto endpoint = endpoint_of(found, choice.transport);
+    if (!endpoint) {
       continue;
     }
     try {
-      way->serial = serial_of(*way, root);
+      endpoint->serial = serial_of(*endpoint, root);
     } catch (const Error &error) {
       unasked = std::string(error.what());
       continue;
     }
-    if (is_same_serial(way->serial, choice.device)) {
-      return *way;
+    if (is_same_serial(endpoint->serial, choice.device)) {
+      return *endpoint;
     }
-    others += " " + way->serial;
+    others += " " + endpoint->serial;
   }
   throw Error(ErrorCode::no_such_fingertip, "no fingertip " + choice.device + " here" +
                                                 (!others.empty()    ? ", there are:" + others
@@ -111,101 +111,102 @@ static std::string take_socket(std::vector<Shared> &shared, const std::string &s
   return socket;
 }
 
-Finds find_fingertips(const std::string &root) {
+FoundDevices find_fingertips(const std::string &root) {
   std::vector<Shared> shared = find_shared();
-  Finds finds = {find_usb(root), find_in_environment()};
-  for (Found &found : finds.here) {
+  FoundDevices devices = {find_usb(root), find_in_environment()};
+  for (Found &found : devices.here) {
     found.socket = take_socket(shared, found.serial, found.port);
   }
-  for (Found &found : finds.in_environment) {
+  for (Found &found : devices.in_environment) {
     found.socket = take_socket(shared, "", found.port);
   }
   for (const Shared &other : shared) {
-    finds.here.push_back({other.serial, "", other.port, {}, other.socket});
+    devices.here.push_back({other.serial, "", other.port, {}, other.socket});
   }
-  return finds;
+  return devices;
 }
 
-std::optional<Way> way_to(const Found &found, Reach reach) {
-  if (!found.socket.empty() && (reach == Reach::automatic || reach == Reach::socket)) {
-    return Way{found.serial, found.port, found.usb.has_value(), found.socket};
+std::optional<Endpoint> endpoint_of(const Found &found, TransportKind kind) {
+  if (!found.socket.empty() && (kind == TransportKind::automatic || kind == TransportKind::socket)) {
+    return Endpoint{found.serial, found.port, found.usb.has_value(), found.socket};
   }
-  if (found.usb && (reach == Reach::usb || (reach == Reach::automatic && found.port.empty()))) {
-    return Way{found.serial, "", true};
+  if (found.usb && (kind == TransportKind::usb || (kind == TransportKind::automatic && found.port.empty()))) {
+    return Endpoint{found.serial, "", true};
   }
-  if (found.port.empty() || reach == Reach::usb || reach == Reach::socket) {
+  if (found.port.empty() || kind == TransportKind::usb || kind == TransportKind::socket) {
     return std::nullopt;
   }
-  return Way{found.serial, found.port, found.usb.has_value()};
+  return Endpoint{found.serial, found.port, found.usb.has_value()};
 }
 
-wire_info ask(const Way &way, const std::function<bool()> &stop, const std::string &root) {
-  auto transport = open_way(way, root);
+wire_info ask(const Endpoint &endpoint, const std::function<bool()> &stop, const std::string &root) {
+  auto transport = open_endpoint(endpoint, root);
   Session session(*transport, stop);
   return session.info(QUICK).body.info;
 }
 
-Way choose_way(const Choice &wanted, const std::string &root) {
+Endpoint choose_endpoint(const Choice &wanted, const std::string &root) {
   Choice choice = wanted;
   if (!choice.port.empty()) {
     choice.port = port_of(choice.port);
-    if (choice.reach == Reach::usb) {
+    if (choice.transport == TransportKind::usb) {
       throw Error(ErrorCode::wrong_choice, "a serial port is not reached by libusb");
     }
     std::vector<Shared> shared = find_shared();
     const Found found = {"", "", stable_port(choice.port, root), {}, take_socket(shared, "", choice.port)};
-    Way way = sure_way_to(found, choice.reach);
+    Endpoint endpoint = sure_endpoint_of(found, choice.transport);
     if (!choice.device.empty()) {
-      way.serial = serial_of(way, root);
-      if (!is_same_serial(way.serial, choice.device)) {
-        throw Error(ErrorCode::other_fingertip, choice.port + ": is fingertip " + way.serial + ", not " + choice.device);
+      endpoint.serial = serial_of(endpoint, root);
+      if (!is_same_serial(endpoint.serial, choice.device)) {
+        throw Error(ErrorCode::other_fingertip, choice.port + ": is fingertip " + endpoint.serial + ", not " + choice.device);
       }
     }
-    return way;
+    return endpoint;
   }
   if (!choice.device.empty()) {
     return with_wanted_serial(choice, root);
   }
-  Finds finds = find_fingertips(root);
-  if (!finds.in_environment.empty() && choice.reach != Reach::usb) {
-    return only_one(finds.in_environment, choice.reach, root, "");
+  FoundDevices devices = find_fingertips(root);
+  if (!devices.in_environment.empty() && choice.transport != TransportKind::usb) {
+    return only_one(devices.in_environment, choice.transport, root, "");
   }
-  return only_one(finds.here, choice.reach, root, choice.reach == Reach::usb ? "no fingertip found by libusb" : "no fingertip found");
+  return only_one(devices.here, choice.transport, root,
+                  choice.transport == TransportKind::usb ? "no fingertip found by libusb" : "no fingertip found");
 }
 
-std::vector<Way> all_ways(Reach reach, const std::string &root) {
-  std::vector<Way> ways;
-  Finds finds = find_fingertips(root);
-  for (const Found &found : finds.here) {
-    ways.push_back(sure_way_to(found, reach));
+std::vector<Endpoint> all_endpoints(TransportKind kind, const std::string &root) {
+  std::vector<Endpoint> endpoints;
+  FoundDevices devices = find_fingertips(root);
+  for (const Found &found : devices.here) {
+    endpoints.push_back(sure_endpoint_of(found, kind));
   }
-  for (const Found &found : finds.in_environment) {
-    if (auto way = way_to(found, reach)) {
-      way->serial = serial_of(*way, root);
-      ways.push_back(*way);
+  for (const Found &found : devices.in_environment) {
+    if (auto endpoint = endpoint_of(found, kind)) {
+      endpoint->serial = serial_of(*endpoint, root);
+      endpoints.push_back(*endpoint);
     }
   }
-  return ways;
+  return endpoints;
 }
 
-std::unique_ptr<Transport> open_way(const Way &way, const std::string &root) {
-  if (!way.socket.empty()) {
-    return std::make_unique<SocketTransport>(way.socket);
+std::unique_ptr<Transport> open_endpoint(const Endpoint &endpoint, const std::string &root) {
+  if (!endpoint.socket.empty()) {
+    return std::make_unique<SocketTransport>(endpoint.socket);
   }
-  auto find_again = [serial = way.serial, root] {
+  auto find_again = [serial = endpoint.serial, root] {
     auto found = find_usb(root);
     const Found *again = with_serial(found, serial);
     return again ? again->port : std::string();
   };
-  if (!way.port.empty()) {
-    return std::make_unique<SerialTransport>(way.port, way.found_by_usb ? find_again : std::function<std::string()>());
+  if (!endpoint.port.empty()) {
+    return std::make_unique<SerialTransport>(endpoint.port, endpoint.found_by_usb ? find_again : std::function<std::string()>());
   }
   /* libusb would take the port away from the program that has it open. */
   std::string port = find_again();
   if (!port.empty()) {
     SerialTransport::check_unused(port);
   }
-  return std::make_unique<UsbTransport>(way.serial);
+  return std::make_unique<UsbTransport>(endpoint.serial);
 }
 
 } // namespace fingertip

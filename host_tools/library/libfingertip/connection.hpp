@@ -13,7 +13,7 @@
 #pragma GCC visibility push(default)
 namespace fingertip {
 
-enum class Reach {
+enum class TransportKind {
   automatic, /* by the socket of the server that shares it, else by its serial port if it has one,
               * else by libusb */
   socket,
@@ -24,11 +24,11 @@ enum class Reach {
 struct Choice {
   std::string port;   /* a serial port or pseudo-terminal; empty: look for a fingertip */
   std::string device; /* its serial number; empty: the only one there is */
-  Reach reach = Reach::automatic;
+  TransportKind transport = TransportKind::automatic;
 };
 
-/* A way to one fingertip. */
-struct Way {
+/* Where one fingertip is reached. */
+struct Endpoint {
   std::string serial;      /* by USB, or as it answered; empty: unknown */
   std::string port;        /* empty: by libusb */
   bool found_by_usb;       /* and found so again when it was gone */
@@ -36,27 +36,27 @@ struct Way {
 };
 
 /* All there are. */
-struct Finds {
+struct FoundDevices {
   std::vector<Found> here;           /* by USB, or shared by a server that reaches them otherwise */
   std::vector<Found> in_environment; /* the paths there */
 };
-Finds find_fingertips(const std::string &root = "/");
+FoundDevices find_fingertips(const std::string &root = "/");
 
 /* Throws Error if there is none, several to choose from, or another one than was wanted. If a serial number is wanted and USB does not
  * report that of a port, the fingertip there is asked for it. Without options the environment goes before USB. */
-Way choose_way(const Choice &choice, const std::string &root = "/");
+Endpoint choose_endpoint(const Choice &choice, const std::string &root = "/");
 
 /* All there are, for programs that take several; the environment's too, each asked who it is. */
-std::vector<Way> all_ways(Reach reach, const std::string &root = "/");
+std::vector<Endpoint> all_endpoints(TransportKind transport, const std::string &root = "/");
 
 /* Throws Error: absent, in use, not allowed. */
-std::unique_ptr<Transport> open_way(const Way &way, const std::string &root = "/");
+std::unique_ptr<Transport> open_endpoint(const Endpoint &endpoint, const std::string &root = "/");
 
-/* How a fingertip that was found would be reached; nothing: not that way. */
-std::optional<Way> way_to(const Found &found, Reach reach);
+/* Where a fingertip that was found would be reached; nothing: not by this transport. */
+std::optional<Endpoint> endpoint_of(const Found &found, TransportKind transport);
 
-/* Who is there, within a second or so. Throws Error as open_way and Session do. */
-wire_info ask(const Way &way, const std::function<bool()> &stop, const std::string &root = "/");
+/* Who is there, within a second or so. Throws Error as open_endpoint and Session do. */
+wire_info ask(const Endpoint &endpoint, const std::function<bool()> &stop, const std::string &root = "/");
 
 } // namespace fingertip
 #pragma GCC visibility pop

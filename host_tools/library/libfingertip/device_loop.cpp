@@ -12,7 +12,7 @@
 namespace fingertip {
 
 using std::chrono::milliseconds;
-using Kind = DeviceNews::Kind;
+using Kind = DeviceUpdate::Kind;
 
 constexpr milliseconds POLL{20};
 constexpr milliseconds REOPEN_INTERVAL{200};
@@ -27,55 +27,55 @@ constexpr std::int64_t LONGEST_BACKLOG_us = 2000000;
 constexpr std::size_t FEED_CAPACITY = 8000;
 constexpr Session::Policy LAST_WORD = {milliseconds(500), 2};
 
-std::vector<DeviceNews> DeviceFeed::take(milliseconds timeout) {
+std::vector<DeviceUpdate> DeviceFeed::take(milliseconds timeout) {
   std::unique_lock<std::mutex> lock(mutex_);
-  for (const HostTime limit = host_now() + timeout; news_.empty() && host_now() < limit;) {
+  for (const HostTime limit = host_now() + timeout; updates_.empty() && host_now() < limit;) {
     lock.unlock();
     filled_.wait(limit);
     lock.lock();
   }
-  std::vector<DeviceNews> taken(std::make_move_iterator(news_.begin()), std::make_move_iterator(news_.end()));
-  news_.clear();
+  std::vector<DeviceUpdate> taken(std::make_move_iterator(updates_.begin()), std::make_move_iterator(updates_.end()));
+  updates_.clear();
   waiting_.clear();
   drained_.set();
   return taken;
 }
 
-void DeviceFeed::put(DeviceNews news, const std::atomic<bool> &abandoned) {
+void DeviceFeed::put(DeviceUpdate update, const std::atomic<bool> &abandoned) {
   std::unique_lock<std::mutex> lock(mutex_);
-  while (waiting_[news.device] >= FEED_CAPACITY && !abandoned) {
+  while (waiting_[update.device] >= FEED_CAPACITY && !abandoned) {
     lock.unlock();
     drained_.wait(host_now() + POLL); /* another loop may take what was meant for this one */
     lock.lock();
   }
   if (!abandoned) {
-    waiting_[news.device]++;
-    news_.push_back(std::move(news));
+    waiting_[update.device]++;
+    updates_.push_back(std::move(update));
     filled_.set();
   }
 }
 
 void DeviceFeed::wake() { drained_.set(); }
 
-DeviceLoop::DeviceLoop(std::size_t number, const Way &way, const Options &options, DeviceFeed &feed)
-    : number_(number), options_(options), feed_(feed), transport_(open_way(way)),
+DeviceLoop::DeviceLoop(std::size_t number, const Endpoint &endpoint, const Options &options, DeviceFeed &feed)
+    : number_(number), options_(options), feed_(feed), transport_(open_endpoint(endpoint)),
       session_(*transport_, [this] { return stop_ && !ending_; }), name_(transport_->description()) {
   if (options.follow_clock) {
     session_.on_exchange([this](const ClockExchange &exchange) {
       fit_.add(exchange);
       if (started_) {
-        DeviceNews news{Kind::clock, number_};
-        news.estimate = *fit_.estimate();
-        news.jumps = fit_.jumps();
-        put(std::move(news));
+        DeviceUpdate update{Kind::clock, number_};
+        update.estimate = *fit_.estimate();
+        update.jumps = fit_.jumps();
+        put(std::move(update));
       }
     });
   }
   if (options.bytes) {
     session_.on_bytes([this](const std::uint8_t *bytes, std::size_t length) {
-      DeviceNews news{Kind::bytes, number_};
-      news.bytes.assign(bytes, bytes + length);
-      put(std::move(news));
+      DeviceUpdate update{Kind::bytes, number_};
+      update.bytes.assign(bytes, bytes + length);
+      put(std::move(update));
     });
   }
   session_.on_packet([this](const wire_packet &packet) { take(packet); });
@@ -159,21 +159,21 @@ void DeviceLoop::greet(bool again) {
   for (int i = 0; options_.follow_clock && i < FIRST_EXCHANGES; i++) {
     session_.command(command_stream(0));
   }
-  DeviceNews news{again ? Kind::back : Kind::ready, number_};
-  news.health = session_.health().body.health;
-  news.packet = session_.info();
-  news.relation = session_.clock();
-  news.host_us = static_cast<double>(steady_now_us());
-  info_ = news.packet.body.info;
+  DeviceUpdate update{again ? Kind::back : Kind::ready, number_};
+  update.health = session_.health().body.health;
+  update.packet = session_.info();
+  update.relation = session_.clock();
+  update.host_us = static_cast<double>(steady_now_us());
+  info_ = update.packet.body.info;
   streams_ = possible_streams(*info_, options_.streams);
   publish();
   read_until_us_ = steady_now_us();
   nothing_expected_ = false;
   gone_ = false;
-  for (DeviceNews &answer : std::exchange(held_, {})) {
+  for (DeviceUpdate &answer : std::exchange(held_, {})) {
     put(std::move(answer));
   }
-  put(std::move(news));
+  put(std::move(update));
   while (!started_) {
     if (stop_) {
       throw Interrupted();
@@ -237,14 +237,14 @@ void DeviceLoop::end_streams() {
 
 void DeviceLoop::take(const wire_packet &packet) {
   std::int64_t now_us = steady_now_us();
-  DeviceNews news{Kind::packet, number_};
-  news.packet = packet;
-  news.host_us = fit_.estimate() ? fit_.estimate()->host_at(packet.t_us) : static_cast<double>(now_us);
+  DeviceUpdate update{Kind::packet, number_};
+  update.packet = packet;
+  update.host_us = fit_.estimate() ? fit_.estimate()->host_at(packet.t_us) : static_cast<double>(now_us);
   if (is_frame(packet)) {
     last_frame_ = host_now();
   }
-  auto until_us = std::clamp(static_cast<std::int64_t>(news.host_us), now_us - LONGEST_BACKLOG_us, now_us);
-  put(std::move(news));
+  auto until_us = std::clamp(static_cast<std::int64_t>(update.host_us), now_us - LONGEST_BACKLOG_us, now_us);
+  put(std::move(update));
   read_until_us_ = until_us;
 }
 
@@ -255,14 +255,14 @@ void DeviceLoop::publish() {
 }
 
 /* What a fingertip answers before its port vanishes again is as if it never was. */
-void DeviceLoop::put(DeviceNews news) {
-  if (gone_ && (news.kind == Kind::packet || news.kind == Kind::clock)) {
-    held_.push_back(std::move(news));
+void DeviceLoop::put(DeviceUpdate update) {
+  if (gone_ && (update.kind == Kind::packet || update.kind == Kind::clock)) {
+    held_.push_back(std::move(update));
   } else {
-    feed_.put(std::move(news), abandoned_);
+    feed_.put(std::move(update), abandoned_);
   }
 }
 
-void DeviceLoop::put(Kind kind) { put(DeviceNews{kind, number_}); }
+void DeviceLoop::put(Kind kind) { put(DeviceUpdate{kind, number_}); }
 
 } // namespace fingertip

@@ -1,14 +1,14 @@
 /* A fingertip from its first answer to the end of its streams. The loop greets it, streams, waits for it when its port
  * vanishes, and greets it again. Each has a thread of its own, so that none waits for another and arrivals are timed as
- * they happen. The news of all of them come out of one feed. One fingertip and many work alike.
+ * they happen. The updates of all of them come out of one feed. One fingertip and many work alike.
  *
  *   DeviceFeed feed;
- *   DeviceLoop loop(0, way, options, feed);
+ *   DeviceLoop loop(0, endpoint, options, feed);
  *   for (bool over = false; !over;) {
- *     for (const DeviceNews &news : feed.take(20ms)) {
- *       if (news.kind == DeviceNews::Kind::ready) loop.start();
+ *     for (const DeviceUpdate &update : feed.take(20ms)) {
+ *       if (update.kind == DeviceUpdate::Kind::ready) loop.start();
  *       ...
- *       over = over || news.kind == DeviceNews::Kind::ended;
+ *       over = over || update.kind == DeviceUpdate::Kind::ended;
  *     }
  *     if (enough) loop.stop();
  *   }
@@ -35,7 +35,7 @@
 #pragma GCC visibility push(default)
 namespace fingertip {
 
-struct DeviceNews {
+struct DeviceUpdate {
   enum class Kind {
     packet, /* every one that came, in order */
     ready,  /* it answered for the first time: packet is the last info packet; it waits for start */
@@ -44,10 +44,10 @@ struct DeviceNews {
     mute,   /* it did not answer to the end of its streams */
     bytes,  /* of the line, before the packets in them; only if they are wanted */
     clock,  /* another estimate; only if clocks are followed */
-    ended,  /* the last news */
+    ended,  /* the last one */
   };
 
-  DeviceNews(Kind what, std::size_t number) : kind(what), device(number) {}
+  DeviceUpdate(Kind what, std::size_t number) : kind(what), device(number) {}
 
   Kind kind;
   std::size_t device;
@@ -61,22 +61,22 @@ struct DeviceNews {
   unsigned jumps = 0;       /* clock */
 };
 
-/* A queue from the loops' threads to the one that takes. It holds three seconds of each fingertip's news at 1308 frames/s.
+/* A queue from the loops' threads to the one that takes. It holds three seconds of each fingertip's updates at 1308 frames/s.
  * A loop whose share is full stops reading, and its fingertip drops and counts what it cannot send. */
 class DeviceFeed {
 public:
   /* All there is, waiting at most this long for the first. */
-  std::vector<DeviceNews> take(std::chrono::milliseconds timeout);
+  std::vector<DeviceUpdate> take(std::chrono::milliseconds timeout);
 
 private:
   friend class DeviceLoop;
 
-  void put(DeviceNews news, const std::atomic<bool> &abandoned);
+  void put(DeviceUpdate update, const std::atomic<bool> &abandoned);
   void wake();
 
   std::mutex mutex_;
   Wake filled_, drained_;
-  std::deque<DeviceNews> news_;
+  std::deque<DeviceUpdate> updates_;
   std::map<std::size_t, std::size_t> waiting_; /* of them, by fingertip */
 };
 
@@ -84,13 +84,13 @@ class DeviceLoop {
 public:
   struct Options {
     std::uint8_t streams = 0;  /* those wanted: of them come those that its firmware has */
-    bool follow_clock = false; /* exchanges ten times a second, news of kind clock */
-    bool bytes = false;        /* news of kind bytes */
+    bool follow_clock = false; /* exchanges ten times a second, updates of kind clock */
+    bool bytes = false;        /* updates of kind bytes */
     bool wait_for_back = true; /* else it ends where the port vanishes */
   };
 
-  /* number: of its news. Throws Error if the port cannot be opened. The feed must outlive it. */
-  DeviceLoop(std::size_t number, const Way &way, const Options &options, DeviceFeed &feed);
+  /* number: of its updates. Throws Error if the port cannot be opened. The feed must outlive it. */
+  DeviceLoop(std::size_t number, const Endpoint &endpoint, const Options &options, DeviceFeed &feed);
   /* Ends the streams first; what is in the feed stays there. */
   ~DeviceLoop();
   DeviceLoop(const DeviceLoop &) = delete;
@@ -108,7 +108,7 @@ public:
   /* The time until which everything was read, on the host's steady clock; endless while nothing is
    * expected: gone, or ended. */
   double read_until_us() const;
-  /* After news of kind ended: throws what ended it, if it was an error. */
+  /* After updates of kind ended: throws what ended it, if it was an error. */
   void rethrow() const;
 
 private:
@@ -120,8 +120,8 @@ private:
   void end_streams();
   void take(const wire_packet &packet);
   void send_wanted();
-  void put(DeviceNews news);
-  void put(DeviceNews::Kind kind);
+  void put(DeviceUpdate update);
+  void put(DeviceUpdate::Kind kind);
   void publish();
 
   std::size_t number_;
@@ -133,9 +133,9 @@ private:
   std::uint8_t streams_ = 0; /* those wanted that its firmware has */
   std::optional<wire_info> info_;
   HostTime asked_{}, last_frame_{};
-  bool gone_ = false;            /* and not back yet */
-  std::vector<DeviceNews> held_; /* until it is back */
-  bool ending_ = false;          /* its last command is not interrupted */
+  bool gone_ = false;              /* and not back yet */
+  std::vector<DeviceUpdate> held_; /* until it is back */
+  bool ending_ = false;            /* its last command is not interrupted */
 
   std::atomic<bool> started_{false}, stop_{false}, abandoned_{false};
   std::atomic<bool> nothing_expected_{false};

@@ -123,13 +123,13 @@ private:
 /* One fingertip, there or waited for. */
 class Server::Station {
 public:
-  Station(Server &server, const Way &way) : server_(server), way_(way), transport_(open_way(way)) { begin(); }
+  Station(Server &server, const Endpoint &endpoint) : server_(server), endpoint_(endpoint), transport_(open_endpoint(endpoint)) { begin(); }
   ~Station() {
     auto end = frame_bytes(command_stream(0));
     transport_->write(end.data(), end.size());
   }
 
-  const Way &way() const { return way_; }
+  const Endpoint &endpoint() const { return endpoint_; }
   std::string name() const { return serial_.empty() ? transport_->description() : serial_; }
 
   /* What to wait for. Returns whether there is more to do at once. */
@@ -198,7 +198,7 @@ private:
 
   void begin() {
     hub_.emplace();
-    serial_ = way_.found_by_usb ? way_.serial : "";
+    serial_ = endpoint_.found_by_usb ? endpoint_.serial : "";
     hub_->tick(host_now());
     flush_line();
     open_for_clients();
@@ -219,7 +219,7 @@ private:
     if (listener_ || serial_.empty()) {
       return;
     }
-    listener_.emplace(server_.folder_, serial_, way_.port.empty() ? "" : transport_->description(), server_.group_);
+    listener_.emplace(server_.folder_, serial_, endpoint_.port.empty() ? "" : transport_->description(), server_.group_);
     log(serial_ + ": shared as " + listener_->path());
   }
 
@@ -359,7 +359,7 @@ private:
   }
 
   Server &server_;
-  Way way_;
+  Endpoint endpoint_;
   std::unique_ptr<Transport> transport_;
   std::optional<Hub> hub_; /* while the fingertip is there */
   std::string serial_;     /* "": not known yet */
@@ -381,18 +381,18 @@ Server::Server(const Options &options, Log log) : folder_(options.folder), group
 
 Server::~Server() = default;
 
-bool Server::has(const Way &way) const {
+bool Server::has(const Endpoint &endpoint) const {
   return std::any_of(stations_.begin(), stations_.end(), [&](const auto &station) {
-    const Way &other = station->way();
-    return way.found_by_usb && other.found_by_usb ? is_same_serial(way.serial, other.serial) : way.port == other.port;
+    const Endpoint &other = station->endpoint();
+    return endpoint.found_by_usb && other.found_by_usb ? is_same_serial(endpoint.serial, other.serial) : endpoint.port == other.port;
   });
 }
 
-void Server::add(const Way &way) {
-  if (!way.socket.empty()) {
-    throw Error(ErrorCode::shared_already, way.socket + ": another program shares this fingertip");
+void Server::add(const Endpoint &endpoint) {
+  if (!endpoint.socket.empty()) {
+    throw Error(ErrorCode::shared_already, endpoint.socket + ": another program shares this fingertip");
   }
-  stations_.push_back(std::make_unique<Station>(*this, way));
+  stations_.push_back(std::make_unique<Station>(*this, endpoint));
 }
 
 void Server::step(milliseconds longest_wait) {

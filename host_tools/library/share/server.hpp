@@ -1,7 +1,7 @@
 /* Owns fingertips and shares each over a Unix socket (share_socket.hpp) with its clients.
  *
  *   Server server(Server::Options(), [](const std::string &line) { ... });
- *   server.add(way);
+ *   server.add(endpoint);
  *   while (!stop) {
  *     server.step(500ms);
  *   }
@@ -42,10 +42,10 @@ public:
 
   bool is_empty() const { return stations_.empty(); }
   /* Whether this fingertip is served here, there or waited for. */
-  bool has(const Way &way) const;
+  bool has(const Endpoint &endpoint) const;
   /* Serves it from now on, through unplugging. Its socket is there once its serial number is known.
    * Throws Error: absent, in use, not allowed, shared by another program. */
-  void add(const Way &way);
+  void add(const Endpoint &endpoint);
 
   /* Waits at most this long for something to do, and does it. */
   void step(std::chrono::milliseconds longest_wait);

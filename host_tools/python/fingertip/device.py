@@ -17,7 +17,7 @@ from .errors import BadValueError, FingertipError, GoneError, InputError, NoFing
 from .frames import Block, Edge, Frame
 from .line import SETTINGS, Capability, Settable, Setting, Streams
 from .recording import Recorder, RecordingWriter
-from .transport import Transport, open_way
+from .transport import Transport, open_endpoint
 from .wire import Acknowledgement, Body, Contact, Crash, Health, Info, LineStatistics, Raw, SyncEdge
 
 EXCHANGE_INTERVAL_us = 500_000  # the two clocks are compared so often
@@ -163,7 +163,7 @@ class Fingertip(Settable, Closing):
         for way in ways:
             opened = False
             try:
-                self._line = Conversation(open_way(way.port, way.share_socket))
+                self._line = Conversation(open_endpoint(way.port, way.share_socket))
                 opened = True
                 self._thread = host_time.thread(self._read_on, name="fingertip", daemon=True)
                 self._thread.start()
@@ -509,9 +509,9 @@ class Fingertip(Settable, Closing):
     def _reopened(self) -> Transport:
         """It may have another name now."""
         with contextlib.suppress(FingertipError):
-            return open_way(*discovery.choose(None, self._info.serial, self._share)[0][1:])
+            return open_endpoint(*discovery.choose(None, self._info.serial, self._share)[0][1:])
         by_socket = self._line.description.endswith(".sock")
-        return open_way("" if by_socket else self._line.description, self._line.description if by_socket else "")
+        return open_endpoint("" if by_socket else self._line.description, self._line.description if by_socket else "")
 
     def _greet(self) -> None:
         """Who is back? Streams only once that is known."""

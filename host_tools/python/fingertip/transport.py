@@ -164,7 +164,7 @@ def _is_socket(path: str) -> bool:
         return False
 
 
-def open_way(port: str, share_socket: str) -> Transport:
+def open_endpoint(port: str, share_socket: str) -> Transport:
     """The socket, if it is there."""
     if share_socket:
         return SocketTransport(share_socket)

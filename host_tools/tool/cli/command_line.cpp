@@ -107,18 +107,18 @@ void check_recording(const std::string &path, bool overwrite) {
   check_output(path, overwrite);
 }
 
-void with_transport(CLI::App *command, Reach &reach) {
-  with_choice<Reach>(command, "--transport",
-                     {{"auto", Reach::automatic}, {"socket", Reach::socket}, {"serial", Reach::serial}, {"usb", Reach::usb}},
-                     "auto, socket, serial or usb", reach,
-                     "socket (of fingertip serve), serial, usb (libusb, past the system's driver), or auto: the first of these that "
-                     "there is")
+void with_transport(CLI::App *command, TransportKind &transport) {
+  using Kind = TransportKind;
+  with_choice<Kind>(command, "--transport",
+                    {{"auto", Kind::automatic}, {"socket", Kind::socket}, {"serial", Kind::serial}, {"usb", Kind::usb}},
+                    "auto, socket, serial or usb", transport,
+                    "socket (of fingertip serve), serial, usb (libusb, past the system's driver), or auto: the first that there is")
       ->type_name("KIND");
 }
 
 void with_port_only(CLI::App *command, Choice &choice) {
   with_value(command, "PATH", "--port", choice.port, "Serial port or pseudo-terminal; default: $FINGERTIP_PORT, or a fingertip plugged in");
-  with_transport(command, choice.reach);
+  with_transport(command, choice.transport);
 }
 
 void with_port(CLI::App *command, Choice &choice) {

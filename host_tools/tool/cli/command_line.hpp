@@ -45,7 +45,7 @@ private:
 void check_recording(const std::string &path, bool overwrite);
 
 /* --transport; --port too; --device too. */
-void with_transport(CLI::App *command, Reach &reach);
+void with_transport(CLI::App *command, TransportKind &transport);
 void with_port_only(CLI::App *command, Choice &choice);
 void with_port(CLI::App *command, Choice &choice);
 /* --seconds, until the end. */

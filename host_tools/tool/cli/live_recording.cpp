@@ -89,11 +89,11 @@ void QueuedSink::run() {
   }
 }
 
-static RecordingWriter writer_of(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready, const std::string &port,
+static RecordingWriter writer_of(const std::string &path, bool overwrite, const std::vector<DeviceUpdate> &ready, const std::string &port,
                                  std::int64_t host_zero_us, const Metadata &extra, QueuedSink *&queue) {
   Metadata head = {{"recorded_by", "fingertip " FINGERTIP_VERSION}, {"started_utc", utc_now()}};
   std::vector<wire_info> infos;
-  for (const DeviceNews &each : ready) {
+  for (const DeviceUpdate &each : ready) {
     infos.push_back(each.packet.body.info);
   }
   const bool both = sends_both(infos[0]);
@@ -124,7 +124,7 @@ std::string utc_now() {
   return std::string(text) + "." + std::to_string(1000 + ms).substr(1) + "Z";
 }
 
-LiveRecording::LiveRecording(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready, const std::string &port,
+LiveRecording::LiveRecording(const std::string &path, bool overwrite, const std::vector<DeviceUpdate> &ready, const std::string &port,
                              std::int64_t host_zero_us, const Metadata &extra)
     : writer_(writer_of(path, overwrite, ready, port, host_zero_us, extra, queue_)) {
   if (queue_) {
@@ -141,9 +141,9 @@ bool LiveRecording::can_write() {
   return !given_up_;
 }
 
-void LiveRecording::packet(const DeviceNews &news) {
+void LiveRecording::packet(const DeviceUpdate &update) {
   if (can_write()) {
-    writer_.packet(news.device, news.packet, news.host_us);
+    writer_.packet(update.device, update.packet, update.host_us);
   }
 }
 

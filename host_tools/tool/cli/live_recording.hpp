@@ -48,11 +48,11 @@ std::string utc_now();
 
 class LiveRecording {
 public:
-  /* ready: the news of that kind of each fingertip; port: of the only one. extra: for the head of a recording of several. */
-  LiveRecording(const std::string &path, bool overwrite, const std::vector<DeviceNews> &ready, const std::string &port,
+  /* ready: the update of that kind of each fingertip; port: of the only one. extra: for the head of a recording of several. */
+  LiveRecording(const std::string &path, bool overwrite, const std::vector<DeviceUpdate> &ready, const std::string &port,
                 std::int64_t host_zero_us, const Metadata &extra = {});
 
-  void packet(const DeviceNews &news);
+  void packet(const DeviceUpdate &update);
   void event(std::size_t device, const std::string &text);
   void finish(const std::vector<LineStatistics> &statistics, const std::string &reason);
   std::uint64_t frames(std::size_t device) const { return writer_.frames(device); }

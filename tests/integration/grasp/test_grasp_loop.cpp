@@ -24,7 +24,8 @@ protected:
     return [state = state_] { return std::make_unique<test::FakeGripper>(state); };
   }
   void begin(GraspLoop::Options options = {}) {
-    loop_ = std::make_unique<GraspLoop>(std::array<Way, 2>{Way{"", left_.link(), false}, Way{"", right_.link(), false}}, options);
+    loop_ = std::make_unique<GraspLoop>(std::array<Endpoint, 2>{Endpoint{"", left_.link(), false}, Endpoint{"", right_.link(), false}},
+                                        options);
     const auto met = loop_->meet([] { return false; });
     EXPECT_EQ(met[0].packet.body.info.serial[0], 'A');
     EXPECT_EQ(met[1].packet.body.info.serial[0], 'B');
@@ -37,7 +38,7 @@ protected:
     const HostTime patience = host_now() + std::chrono::seconds(60);
     while (host_now() < patience) {
       for (GraspNews &news : loop_->take(milliseconds(20))) {
-        frames_ += news.kind == Kind::device && news.device->kind == DeviceNews::Kind::packet && news.device->packet.type == WIRE_CONTACT;
+        frames_ += news.kind == Kind::device && news.device->kind == DeviceUpdate::Kind::packet && news.device->packet.type == WIRE_CONTACT;
         last_ = news.kind == Kind::step ? news : last_;
         if (is_so(news)) {
           return true;

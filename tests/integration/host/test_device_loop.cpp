@@ -5,7 +5,7 @@
 
 using namespace fingertip;
 using std::chrono::milliseconds;
-using Kind = DeviceNews::Kind;
+using Kind = DeviceUpdate::Kind;
 
 /* Its port is a link in a folder of its own. */
 struct Streamer {
@@ -27,7 +27,7 @@ TEST(DeviceLoop, AFullFeedHoldsItBackAndDoesNotKeepItFromEnding) {
   {
     DeviceLoop loop(0, {"", streamer.fingertip.link(), false}, streaming(), feed);
     loop.start();
-    wait_until(host_now() + milliseconds(1500)); /* no news are taken */
+    wait_until(host_now() + milliseconds(1500)); /* no updates are taken */
     before = loop.statistics().packets;
     wait_until(host_now() + milliseconds(300));
     after = loop.statistics().packets;
@@ -48,9 +48,9 @@ TEST(DeviceLoop, AnErrorEndsItAndIsThrownToWhoAsks) {
   std::vector<Kind> kinds;
   auto patience = host_now() + std::chrono::seconds(20);
   while ((kinds.empty() || kinds.back() != Kind::ended) && host_now() < patience) {
-    for (const DeviceNews &news : feed.take(milliseconds(100))) {
-      kinds.push_back(news.kind);
-      if (news.kind == Kind::ready) {
+    for (const DeviceUpdate &update : feed.take(milliseconds(100))) {
+      kinds.push_back(update.kind);
+      if (update.kind == Kind::ready) {
         loop.start();
       }
     }

@@ -122,7 +122,7 @@ class Install(unittest.TestCase):
     def test_only_the_public_is_visible(self):
         symbols = run("nm", "-DC", "--defined-only", self.library)
         ours = {part for name in re.findall(r"^\S+ [TDR] ((?:\w+::)*\w+)", symbols, re.M) for part in name.split("::")}
-        public = """Session Decoder DeviceLoop PacketFile RecordingReader choose_way open_way find_usb command_stream setting_from_text
+        public = """Session Decoder DeviceLoop PacketFile RecordingReader choose_endpoint open_endpoint find_usb command_stream setting_from_text
             flags_text warning_flags info_metadata wire_encode wire_decode fingertip_decoder_feed fingertip_reader_next fingertip_writer_new fingertip_grip_step"""
         own = "SerialTransport UsbTransport RecordingWriter ProgressBar OutputFile read_firmware printable"
         self.assertLessEqual(set(public.split()), ours)

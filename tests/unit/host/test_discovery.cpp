@@ -42,10 +42,10 @@ protected:
     }
   }
 
-  std::string port(const Choice &choice) const { return choose_way(choice, root()).port; }
+  std::string port(const Choice &choice) const { return choose_endpoint(choice, root()).port; }
   Error thrown(const Choice &choice) const {
     try {
-      choose_way(choice, root());
+      choose_endpoint(choice, root());
     } catch (const Error &error) {
       return error;
     }
@@ -69,10 +69,10 @@ TEST_F(FakeSystem, FindsOursAndNoOther) {
   ASSERT_TRUE(found[0].usb);
   EXPECT_EQ(found[0].usb->bus, 1u);
   EXPECT_EQ(found[0].usb->address, 2u);
-  Way way = choose_way({}, root());
-  EXPECT_EQ(way.port, found[0].port);
-  EXPECT_EQ(way.serial, "E660583883265A2C");
-  EXPECT_TRUE(way.found_by_usb);
+  Endpoint endpoint = choose_endpoint({}, root());
+  EXPECT_EQ(endpoint.port, found[0].port);
+  EXPECT_EQ(endpoint.serial, "E660583883265A2C");
+  EXPECT_TRUE(endpoint.found_by_usb);
 }
 
 TEST_F(FakeSystem, ABoardInItsBootRomIsNamed) {
@@ -86,18 +86,18 @@ TEST_F(FakeSystem, ABoardInItsBootRomIsNamed) {
 TEST_F(FakeSystem, WithoutADriverLibusb) {
   plug_in("1-1", "", "A");
   EXPECT_EQ(port({}), "");
-  EXPECT_EQ(choose_way({}, root()).serial, "A");
-  EXPECT_NE(error({"", "", Reach::serial}).find("A: has no serial port"), std::string::npos);
-  EXPECT_NE(error({"", "a", Reach::serial}).find("A: has no serial port"), std::string::npos);
+  EXPECT_EQ(choose_endpoint({}, root()).serial, "A");
+  EXPECT_NE(error({"", "", TransportKind::serial}).find("A: has no serial port"), std::string::npos);
+  EXPECT_NE(error({"", "a", TransportKind::serial}).find("A: has no serial port"), std::string::npos);
 }
 
 TEST_F(FakeSystem, TheWishedTransport) {
   plug_in("1-1", "ttyACM0", "A");
-  EXPECT_EQ(port({"", "", Reach::serial}), root() + "/dev/ttyACM0");
-  EXPECT_EQ(port({"", "", Reach::usb}), "");
+  EXPECT_EQ(port({"", "", TransportKind::serial}), root() + "/dev/ttyACM0");
+  EXPECT_EQ(port({"", "", TransportKind::usb}), "");
   setenv("FINGERTIP_PORT", "/tmp/pty", 1);
-  EXPECT_EQ(port({"", "", Reach::usb}), "");
-  EXPECT_EQ(thrown({"/dev/ttyACM0", "", Reach::usb}).code(), ErrorCode::wrong_choice);
+  EXPECT_EQ(port({"", "", TransportKind::usb}), "");
+  EXPECT_EQ(thrown({"/dev/ttyACM0", "", TransportKind::usb}).code(), ErrorCode::wrong_choice);
 }
 
 TEST_F(FakeSystem, NoneAndSeveralAreErrors) {
@@ -106,20 +106,20 @@ TEST_F(FakeSystem, NoneAndSeveralAreErrors) {
   plug_in("1-1", "ttyACM1", "AAAA");
   EXPECT_EQ(error({}), "several fingertips found: AAAA, BBBB");
   EXPECT_EQ(thrown({}).code(), ErrorCode::several_fingertips);
-  EXPECT_EQ(port({"", "bbbb", Reach::automatic}), root() + "/dev/ttyACM0");
-  EXPECT_EQ(error({"", "CCCC", Reach::automatic}), "no fingertip CCCC here, there are: AAAA BBBB");
-  auto ways = all_ways(Reach::automatic, root());
-  ASSERT_EQ(ways.size(), 2u);
-  EXPECT_EQ(ways[0].serial, "AAAA");
-  EXPECT_EQ(ways[1].serial, "BBBB");
+  EXPECT_EQ(port({"", "bbbb", TransportKind::automatic}), root() + "/dev/ttyACM0");
+  EXPECT_EQ(error({"", "CCCC", TransportKind::automatic}), "no fingertip CCCC here, there are: AAAA BBBB");
+  auto endpoints = all_endpoints(TransportKind::automatic, root());
+  ASSERT_EQ(endpoints.size(), 2u);
+  EXPECT_EQ(endpoints[0].serial, "AAAA");
+  EXPECT_EQ(endpoints[1].serial, "BBBB");
 }
 
 TEST_F(FakeSystem, TheEnvironmentGoesBeforeUsbAndTheArgumentBeforeBoth) {
   plug_in("1-1", "ttyACM0", "A");
   setenv("FINGERTIP_PORT", "/tmp/pty", 1);
   EXPECT_EQ(port({}), "/tmp/pty");
-  EXPECT_EQ(port({"/tmp/other", "", Reach::automatic}), "/tmp/other");
-  EXPECT_EQ(port({"", "A", Reach::automatic}), root() + "/dev/ttyACM0");
+  EXPECT_EQ(port({"/tmp/other", "", TransportKind::automatic}), "/tmp/other");
+  EXPECT_EQ(port({"", "A", TransportKind::automatic}), root() + "/dev/ttyACM0");
   ASSERT_EQ(find_in_environment().size(), 1u);
   EXPECT_EQ(find_in_environment()[0].product, "from FINGERTIP_PORT, no such port");
   setenv("FINGERTIP_PORT", root().c_str(), 1);

@@ -95,7 +95,7 @@ TEST(QueuedSink, ADiskThatHangsDoesNotKeepAnotherInterruptFromEndingIt) {
 
 TEST(LiveRecording, BeginsOnlyWithItsHeadOnTheDisk) {
   test::TemporaryFolder folder;
-  std::vector<DeviceNews> ready(1, DeviceNews(DeviceNews::Kind::ready, 0));
+  std::vector<DeviceUpdate> ready(1, DeviceUpdate(DeviceUpdate::Kind::ready, 0));
   ready[0].packet = test::make_info(0, 0);
   for (const char *name : {"a.csv", "a.mcap"}) {
     LiveRecording recording(folder / name, true, ready, "port", 0);

@@ -5,7 +5,7 @@
 #include <fingertip/names.hpp>
 
 int main() try {
-  auto transport = fingertip::open_way(fingertip::choose_way({}));
+  auto transport = fingertip::open_endpoint(fingertip::choose_endpoint({}));
   fingertip::Session session(*transport);
   session.on_packet([](const wire_packet &packet) {
     const wire_contact &contact = packet.body.contact;

@@ -81,7 +81,7 @@ void confirm(const CalibrateOptions &options, const std::string &question, const
 class CalibratedDevice {
 public:
   explicit CalibratedDevice(const CalibrateOptions &options)
-      : transport_(open_way(choose_way(options.choice))), session_(*transport_, [this] { return !ending_ && stop_requested(); }),
+      : transport_(open_endpoint(choose_endpoint(options.choice))), session_(*transport_, [this] { return !ending_ && stop_requested(); }),
         info_(session_.info().body.info) {}
   ~CalibratedDevice() {
     if (streaming_) {

@@ -39,10 +39,10 @@ std::string reached_text(const Found &found) {
                 ", ");
 }
 
-int list(Reach reach) {
-  Finds finds = find_fingertips();
-  std::vector<Found> all = finds.here;
-  all.insert(all.end(), finds.in_environment.begin(), finds.in_environment.end());
+int list(TransportKind transport) {
+  FoundDevices devices = find_fingertips();
+  std::vector<Found> all = devices.here;
+  all.insert(all.end(), devices.in_environment.begin(), devices.in_environment.end());
   if (all.empty()) {
     throw Error(ErrorCode::no_fingertip, "no fingertip found");
   }
@@ -50,9 +50,9 @@ int list(Reach reach) {
     Metadata info = {{"serial", found.serial}};
     std::string reached = reached_text(found);
     try {
-      auto way = way_to(found, reach);
-      if (way) {
-        info = info_metadata(ask(*way, stop_requested));
+      auto endpoint = endpoint_of(found, transport);
+      if (endpoint) {
+        info = info_metadata(ask(*endpoint, stop_requested));
       }
     } catch (const Error &error) {
       reached += " (" + error_text(error) + ")";
@@ -85,7 +85,8 @@ struct Device {
   std::unique_ptr<Transport> transport;
   Session session;
 
-  explicit Device(const Choice &choice) : transport(open_way(choose_way(choice))), session(*transport, patience(*transport, session)) {}
+  explicit Device(const Choice &choice)
+      : transport(open_endpoint(choose_endpoint(choice))), session(*transport, patience(*transport, session)) {}
 };
 
 /* Whether the firmware has what it belongs to, and no other table shows it. */
@@ -337,8 +338,8 @@ void add_list(CommandLine &line) {
   with_transport(line.add("list",
                           "List the fingertips plugged in, and the paths in $FINGERTIP_PORT: serial number, board, "
                           "firmware, how it is reached",
-                          [choice] { return list(choice->reach); }),
-                 choice->reach);
+                          [choice] { return list(choice->transport); }),
+                 choice->transport);
 }
 
 void add_info(CommandLine &line) {

@@ -38,12 +38,12 @@ constexpr Session::Policy PATIENCE = {std::chrono::milliseconds(1000), 4};
 constexpr std::int64_t SILENCE_MAX_us = 12000000;
 
 /* What somebody who has it has open. */
-std::string device_of(const Way &way, const std::string &root) {
-  if (!way.port.empty()) {
-    return way.port;
+std::string device_of(const Endpoint &endpoint, const std::string &root) {
+  if (!endpoint.port.empty()) {
+    return endpoint.port;
   }
   for (const Found &found : find_usb(root)) {
-    if (found.usb && is_same_serial(found.serial, way.serial)) {
+    if (found.usb && is_same_serial(found.serial, endpoint.serial)) {
       char name[32];
       std::snprintf(name, sizeof name, "dev/bus/usb/%03u/%03u", found.usb->bus, found.usb->address);
       return (std::filesystem::path(root) / name).string();
@@ -130,13 +130,13 @@ Facts gather(const DoctorOptions &options, const std::function<bool()> &stop, co
   facts.rule = find_rule(options.root);
   try {
     facts.port = options.choice.port;
-    Way way = choose_way(options.choice, options.root);
-    facts.is_shared = !way.socket.empty();
-    facts.port = device_of(way, options.root);
+    Endpoint endpoint = choose_endpoint(options.choice, options.root);
+    facts.is_shared = !endpoint.socket.empty();
+    facts.port = device_of(endpoint, options.root);
     std::error_code none;
     facts.is_plugged_in = std::filesystem::canonical(facts.port, none).parent_path() != "/dev/pts";
     facts.holders = holders_of(facts.port, options.root);
-    auto transport = open_way(way, options.root);
+    auto transport = open_endpoint(endpoint, options.root);
     facts.port = transport->description();
     Session session(*transport, stop);
     facts.info = session.info(PATIENCE).body.info;

@@ -171,10 +171,10 @@ private:
 };
 
 /* Asks the fingertip into its loader; its serial number if it reported one. */
-std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &image, const Way &way) {
-  auto transport = open_way(way);
+std::string ask_into_loader(const FlashOptions &options, const FirmwareImage &image, const Endpoint &endpoint) {
+  auto transport = open_endpoint(endpoint);
   Session session(*transport, stop_requested);
-  std::string serial = way.serial;
+  std::string serial = endpoint.serial;
   try {
     wire_info info = session.info(QUICK).body.info;
     if (is_simulated(info)) {
@@ -220,7 +220,7 @@ std::optional<wire_info> wait_for_return(const Choice &choice) {
   while (host_now() - begin < RETURN_TIMEOUT) {
     sleep_or_stop();
     try {
-      return ask(choose_way(choice), stop_requested);
+      return ask(choose_endpoint(choice), stop_requested);
     } catch (const Error &error) {
       last = error;
     }
@@ -248,13 +248,13 @@ int flash(const FlashOptions &options) {
     volume = Volume::find(options.volume, true);
   }
   if (!volume) {
-    std::optional<Way> way;
+    std::optional<Endpoint> endpoint;
     try {
-      way = choose_way(choice);
+      endpoint = choose_endpoint(choice);
     } catch (const Error &error) {
       throw Error(error_text(error) + "; or " + PRESS);
     }
-    std::string serial = ask_into_loader(options, image, *way);
+    std::string serial = ask_into_loader(options, image, *endpoint);
     if (choice.port.empty() && !serial.empty()) {
       choice.device = serial;
     }

@@ -38,7 +38,7 @@ using std::chrono::milliseconds;
 struct GraspOptions {
   GripperWay gripper;
   std::string left, right; /* serial number, or port; empty: what there is */
-  Reach reach = Reach::automatic;
+  TransportKind transport = TransportKind::automatic;
   std::map<std::string, double> limits;   /* by name, grasp/settings.hpp */
   std::map<std::string, double> breaking; /* the same, of a preset; limits override them */
   bool activate = false;
@@ -73,32 +73,32 @@ constexpr struct {
             {'p', GRIP_REQUEST_PLACE, "place"},
             {'r', GRIP_REQUEST_HAND_OVER, "hand over"}};
 
-std::optional<Way> way_of(const std::string &text, Reach reach) {
+std::optional<Endpoint> endpoint_at(const std::string &text, TransportKind transport) {
   if (text.empty()) {
     return std::nullopt;
   }
   bool is_port = text.find('/') != std::string::npos || text.rfind("sim:", 0) == 0;
-  return choose_way({is_port ? text : "", is_port ? "" : text, reach});
+  return choose_endpoint({is_port ? text : "", is_port ? "" : text, transport});
 }
 
-bool is_same(const Way &one, const Way &other) {
+bool is_same(const Endpoint &one, const Endpoint &other) {
   return one.serial.empty() || other.serial.empty() ? one.port == other.port : is_same_serial(one.serial, other.serial);
 }
 
-std::array<Way, FINGERS> ways_of(const GraspOptions &options) {
-  const std::optional<Way> left = way_of(options.left, options.reach), right = way_of(options.right, options.reach);
+std::array<Endpoint, FINGERS> ways_of(const GraspOptions &options) {
+  const std::optional<Endpoint> left = endpoint_at(options.left, options.transport), right = endpoint_at(options.right, options.transport);
   if (left && right) {
     if (is_same(*left, *right)) {
       throw WrongUsage("--left and --right name the same fingertip; name two");
     }
     return {*left, *right};
   }
-  std::vector<Way> others;
+  std::vector<Endpoint> others;
   std::string names;
-  for (const Way &way : all_ways(options.reach)) {
-    names += " " + (way.serial.empty() ? way.port : way.serial);
-    if (!(left && is_same(way, *left)) && !(right && is_same(way, *right))) {
-      others.push_back(way);
+  for (const Endpoint &endpoint : all_endpoints(options.transport)) {
+    names += " " + (endpoint.serial.empty() ? endpoint.port : endpoint.serial);
+    if (!(left && is_same(endpoint, *left)) && !(right && is_same(endpoint, *right))) {
+      others.push_back(endpoint);
     }
   }
   if (others.size() != (left || right ? 1 : 2)) {
@@ -175,7 +175,7 @@ private:
       Metadata head = {{"grasp_gripper", line}};
       const Metadata all = settings_metadata(settings_);
       head.insert(head.end(), all.begin(), all.end());
-      recording_.emplace(options_.recording, options_.overwrite, std::vector<DeviceNews>(ready.begin(), ready.end()), "", zero_us_, head);
+      recording_.emplace(options_.recording, options_.overwrite, std::vector<DeviceUpdate>(ready.begin(), ready.end()), "", zero_us_, head);
       keep([&] { recording_->writer().comment(GRIP_ROW_KEY, static_cast<double>(zero_us_), "time_us," + grip_columns()); });
     }
     loop_.begin(
@@ -286,8 +286,8 @@ private:
     return ended;
   }
 
-  void take_device(DeviceNews &news) {
-    using Kind = DeviceNews::Kind;
+  void take_device(DeviceUpdate &news) {
+    using Kind = DeviceUpdate::Kind;
     Model &model = models_[news.device];
     switch (news.kind) {
     case Kind::packet:
@@ -312,7 +312,7 @@ private:
   }
 
   /* Nothing moves before both have a zero. */
-  void look_at_start(const DeviceNews &news) {
+  void look_at_start(const DeviceUpdate &news) {
     if (requested_ || news.packet.type != WIRE_CONTACT) {
       return;
     }
@@ -574,7 +574,7 @@ void add_grasp(CommandLine &line) {
   with_value(command, "FILE.csv|FILE.mcap", "-o,--record", options->recording, "Record all of it");
   command->add_flag("--overwrite", options->overwrite, "Replace the recording if it exists");
   command->add_flag("--quiet", options->quiet, "Print only changes, on standard error");
-  with_transport(command, options->reach);
+  with_transport(command, options->transport);
   with_colour(command, options->colour);
   with_gripper_line(command, options->gripper);
   with_presets(command, options->breaking);

@@ -47,16 +47,16 @@ struct LiveOptions {
 
 class Live {
 public:
-  Live(const LiveOptions &options, const std::vector<Way> &ways)
-      : options_(options), models_(ways.size()), ready_(ways.size()), taring_(ways.size()), accepted_(ways.size()),
-        reported_missing_(ways.size()) {
+  Live(const LiveOptions &options, const std::vector<Endpoint> &endpoints)
+      : options_(options), models_(endpoints.size()), ready_(endpoints.size()), taring_(endpoints.size()), accepted_(endpoints.size()),
+        reported_missing_(endpoints.size()) {
     DeviceLoop::Options wanted;
     wanted.streams = WIRE_STREAM_ALL;
     wanted.follow_clock = several();
     wanted.bytes = !options.raw_bytes.empty();
     wanted.wait_for_back = !options.until_gone;
     for (std::size_t i = 0; i < models_.size(); i++) {
-      loops_.push_back(std::make_unique<DeviceLoop>(i, ways[i], wanted, feed_));
+      loops_.push_back(std::make_unique<DeviceLoop>(i, endpoints[i], wanted, feed_));
       models_[i].set_source(loops_[i]->name());
     }
     running_ = loops_.size();
@@ -68,7 +68,7 @@ public:
 
   int run() {
     while (running_ > 0) {
-      take_news();
+      take_updates();
       show();
       if (reason_.empty()) {
         reason_ = reason_to_end();
@@ -103,61 +103,61 @@ public:
 private:
   bool several() const { return models_.size() > 1; }
 
-  void take_news() {
+  void take_updates() {
     /* Asked first: what was read until then is in the feed. A row waits for those of a fingertip whose thread got no time to read them. */
     double settled_us = static_cast<double>(steady_now_us());
     for (const auto &loop : loops_) {
       settled_us = std::min(settled_us, loop->read_until_us());
     }
-    for (DeviceNews &news : feed_.take(POLL)) {
-      take(news);
+    for (DeviceUpdate &update : feed_.take(POLL)) {
+      take(update);
     }
     if (RecordingWriter *recording = joint_recording()) {
       recording->settle(settled_us - SETTLE_us);
     }
   }
 
-  void take(DeviceNews &news) {
-    using Kind = DeviceNews::Kind;
-    Model &model = models_[news.device];
-    switch (news.kind) {
+  void take(DeviceUpdate &update) {
+    using Kind = DeviceUpdate::Kind;
+    Model &model = models_[update.device];
+    switch (update.kind) {
     case Kind::packet:
-      model.take(news.packet);
-      if (news.packet.type == WIRE_HEALTH) {
-        report_missing(news.device);
+      model.take(update.packet);
+      if (update.packet.type == WIRE_HEALTH) {
+        report_missing(update.device);
       }
-      take_answer(news.device, news.packet);
+      take_answer(update.device, update.packet);
       if (recording_) {
-        recording_->packet(news);
+        recording_->packet(update);
       }
       break;
     case Kind::ready:
-      ready_[news.device] = std::move(news);
+      ready_[update.device] = std::move(update);
       if (std::all_of(ready_.begin(), ready_.end(), [](const auto &each) { return each; })) {
         begin();
       }
       break;
     case Kind::back:
       model.set_state(Model::State::live);
-      event(news.device, EVENT_BACK);
+      event(update.device, EVENT_BACK);
       break;
     case Kind::gone:
       model.set_state(Model::State::gone);
       any_gone_ = true;
-      event(news.device, EVENT_GONE);
+      event(update.device, EVENT_GONE);
       break;
-    case Kind::mute: event(news.device, "no answer to the end of the streams"); break;
+    case Kind::mute: event(update.device, "no answer to the end of the streams"); break;
     case Kind::bytes:
       keep([&] {
         if (!raw_bytes_) {
           raw_bytes_ = std::make_unique<QueuedSink>(options_.raw_bytes, options_.overwrite);
         }
-        raw_bytes_->append(news.bytes.data(), news.bytes.size());
+        raw_bytes_->append(update.bytes.data(), update.bytes.size());
       });
       break;
     case Kind::clock:
       if (RecordingWriter *recording = joint_recording()) {
-        recording->clock(news.device, news.estimate, news.jumps);
+        recording->clock(update.device, update.estimate, update.jumps);
       }
       break;
     case Kind::ended:
@@ -181,10 +181,10 @@ private:
 
   /* Every one of them has answered. */
   void begin() {
-    std::vector<DeviceNews> ready;
+    std::vector<DeviceUpdate> ready;
     for (std::size_t i = 0; i < loops_.size(); i++) {
       const char *serial = ready_[i]->packet.body.info.serial;
-      for (const DeviceNews &other : ready) {
+      for (const DeviceUpdate &other : ready) {
         if (std::memcmp(other.packet.body.info.serial, serial, WIRE_TEXT_BYTES) == 0) {
           throw Error(loops_[i]->name() + ": is the same fingertip as another; name each once");
         }
@@ -375,7 +375,7 @@ private:
   const bool to_standard_output_ = options_.recording == STDOUT_NAME;
   DeviceFeed feed_;
   std::vector<Model> models_;
-  std::vector<std::optional<DeviceNews>> ready_;
+  std::vector<std::optional<DeviceUpdate>> ready_;
   std::unique_ptr<ByteSink> raw_bytes_;
   std::optional<Error> raw_failure_;
   std::optional<LiveRecording> recording_;
@@ -408,21 +408,21 @@ void check_outputs(const LiveOptions &options) {
 }
 
 /* Throws Error if there is no fingertip, or it is not clear which. */
-std::vector<Way> ways_of(const LiveOptions &options) {
-  std::vector<Way> ways;
+std::vector<Endpoint> endpoints_of(const LiveOptions &options) {
+  std::vector<Endpoint> endpoints;
   if (options.all) {
-    ways = all_ways(options.choice.reach);
+    endpoints = all_endpoints(options.choice.transport);
   }
-  if (!ways.empty()) {
-    return ways;
+  if (!endpoints.empty()) {
+    return endpoints;
   }
   for (const std::string &device : options.devices) {
-    ways.push_back(choose_way({options.choice.port, device, options.choice.reach}));
+    endpoints.push_back(choose_endpoint({options.choice.port, device, options.choice.transport}));
   }
-  if (ways.empty()) {
-    ways.push_back(choose_way(options.choice));
+  if (endpoints.empty()) {
+    endpoints.push_back(choose_endpoint(options.choice));
   }
-  return ways;
+  return endpoints;
 }
 
 int run(const LiveOptions &options) {
@@ -436,11 +436,11 @@ int run(const LiveOptions &options) {
     throw WrongUsage("--raw-bytes needs a file; give it a name");
   }
   check_outputs(options);
-  const std::vector<Way> ways = ways_of(options);
-  if (ways.size() > 1 && !options.raw_bytes.empty()) {
+  const std::vector<Endpoint> endpoints = endpoints_of(options);
+  if (endpoints.size() > 1 && !options.raw_bytes.empty()) {
     throw Error("--raw-bytes keeps one fingertip's line; leave it out, or choose one fingertip");
   }
-  return Live(options, ways).run();
+  return Live(options, endpoints).run();
 }
 
 CLI::App *add(CommandLine &line, const std::string &name, const std::string &help, const std::shared_ptr<LiveOptions> &options) {

@@ -45,11 +45,11 @@ struct Errors {
 };
 
 /* Serves a fingertip unless it is served; one that cannot be keeps none of the others. */
-template <typename WayOf> void serve_if_there(Server &server, Errors &errors, const std::string &name, WayOf way_of) {
+template <typename FindEndpoint> void serve_if_there(Server &server, Errors &errors, const std::string &name, FindEndpoint find_endpoint) {
   try {
-    const std::optional<Way> way = way_of();
-    if (way && !server.has(*way)) {
-      server.add(*way);
+    const std::optional<Endpoint> endpoint = find_endpoint();
+    if (endpoint && !server.has(*endpoint)) {
+      server.add(*endpoint);
     }
     errors.texts.erase(name);
   } catch (const Error &error) {
@@ -68,11 +68,13 @@ void look(Server &server, const ServeOptions &options, Errors &errors) {
       if (serials[found.serial]++) {
         throw Error(found.serial + ": another fingertip has this serial number, and one of them is shared");
       }
-      return way_to(found, options.choice.reach);
+      return endpoint_of(found, options.choice.transport);
     });
   }
   for (const std::string &each : options.devices) {
-    serve_if_there(server, errors, each, [&] { return std::optional(choose_way({options.choice.port, each, options.choice.reach})); });
+    serve_if_there(server, errors, each, [&] {
+      return std::optional(choose_endpoint({options.choice.port, each, options.choice.transport}));
+    });
   }
 }
 
@@ -81,10 +83,10 @@ int serve(const ServeOptions &options) {
   const bool is_one_port = options.devices.empty() && !options.choice.port.empty();
   Errors errors;
   if (is_one_port) {
-    server.add(choose_way(options.choice));
+    server.add(choose_endpoint(options.choice));
   } else if (options.devices.empty()) {
-    for (const Way &way : all_ways(options.choice.reach)) {
-      serve_if_there(server, errors, way.port, [&] { return std::optional(way); });
+    for (const Endpoint &endpoint : all_endpoints(options.choice.transport)) {
+      serve_if_there(server, errors, endpoint.port, [&] { return std::optional(endpoint); });
     }
   }
   look(server, options, errors);
