@@ -3,7 +3,7 @@
 
 usage: check_sources.py [ROOT]
 
-Prints one line for each violation and exits with 1 if there is any.
+Prints one line for each violation and exits with 1 if there is any. Each rule has lines that it finds, and fails if it does not.
 """
 
 import pathlib
@@ -35,24 +35,32 @@ BOARDS = "|".join(sorted(path.parent.name for path in pathlib.Path(__file__).res
 
 
 def rules_for(path):
-    """(pattern, what is wrong) that apply to this path, relative to the root."""
+    """(pattern, what is wrong, a line of each kind) that apply to this path, relative to the root."""
     top = path.parts[0]
-    rules = [(r'#include\s+"\.\./', 'includes through "../": name the folder in CMake and in the include')]
+    rules = [(r'#include\s+"\.\./', 'includes through "../": name the folder in CMake and in the include', '#include "../b/b.h"')]
     if top == "firmware":
         rules += [
-            (r"\bvolatile\b", "volatile belongs under boards/"),
-            (r"\bdouble\b", "double has no place in the firmware"),
-            (r"\b(malloc|calloc|realloc|free)\s*\(", "the firmware does not allocate"),
-            (r"#include\s+<(stdio|stdlib)\.h>", "the firmware uses no stdio and no stdlib"),
-            (r"\b0x(400|501|d00)[0-9A-Fa-f]{5}\b", "register addresses belong under boards/"),
-            (rf'#include\s+"({BOARDS}|reference|libfingertip)/', "the firmware does not reach into boards or host tools"),
+            (r"\bvolatile\b", "volatile belongs under boards/", "static volatile int x;"),
+            (r"\bdouble\b", "double has no place in the firmware", "double x;"),
+            (r"\b(malloc|calloc|realloc|free)\s*\(", "the firmware does not allocate", "p = malloc (4);"),
+            (r"#include\s+<(stdio|stdlib)\.h>", "the firmware uses no stdio and no stdlib", "#include <stdio.h>"),
+            (r"\b0x(400|501|d00)[0-9A-Fa-f]{5}\b", "register addresses belong under boards/", "(int *)0x40044000"),
+            (
+                rf'#include\s+"({BOARDS}|reference|libfingertip)/',
+                "the firmware does not reach into boards or host tools",
+                '#include "rp2040/i2c.h"',
+            ),
         ]
     if top == "host_tools" and path.parts[1] not in MEASURING and path.name != "clock.cpp":
         clocks = r"\b(steady|system|high_resolution)_clock::now\s*\(|this_thread::sleep|\bu?sleep\s*\(|\bpoll\([^)]*, -?[1-9]\d*\)"
-        rules.append((clocks, "time and waits of the host programs come from libfingertip/clock.hpp, so that tests can simulate them"))
+        message = "time and waits of the host programs come from libfingertip/clock.hpp, so that tests can simulate them"
+        rules.append((clocks, message, "steady_clock::now()", "std::this_thread::sleep_for(PAUSE)", "poll(&waiting, 1, 100)"))
     if top == "host_tools" and path.parts[1] in PRODUCT:
-        rules.append((r'#include\s+"(simulation|report)/', "the product does not reach into the simulation, nor into what measures it"))
-    return [(re.compile(pattern), message) for pattern, message in rules]
+        message = "the product does not reach into the simulation, nor into what measures it"
+        rules.append((r'#include\s+"(simulation|report)/', message, '#include "simulation/twin/contact.hpp"'))
+    for pattern, message, *lines in rules:
+        assert all(re.search(pattern, line) for line in lines), message
+    return [(re.compile(pattern), message) for pattern, message, *_ in rules]
 
 
 # What a test waits with, by the system's clock. A file whose subject is real time says so in a comment, "real time: ", and why.
@@ -66,6 +74,18 @@ WAITS = (
     ),
     ("retry", re.compile(r"once_in_three|\b(?:flaky|retries|retry_until|rerun_failures|ctest --repeat)\b")),
 )
+SLEEPS = (
+    (
+        "    time.sleep(1)",
+        "    await asyncio.sleep(1)",
+        '    self.sh("sleep 4")',
+        "std::this_thread::sleep_for(milliseconds(1));",
+        "  usleep(100);",
+    )
+    + ("await new Promise((r) => setTimeout(r, 25));", "while :; do sleep 0.1; done"),
+    ("world.sleep(1)", "def sleep(self):", "asleep(3)"),  # none
+)
+assert [sum(map(bool, map(WAITS[0][1].search, lines))) for lines in SLEEPS] == [len(SLEEPS[0]), 0]
 TESTS = SOURCE | {".py", ".mjs", ".js", ".ts", ".sh"}
 REAL_TIME = re.compile(r"^\s*(?:#|//|\*)?\s*real time: ")
 
