@@ -1,5 +1,5 @@
-/* The drift of each sensor's level in a calm, in which nothing touches and every level keeps up: from snapshots of the
- * levels of all sensors. In a contact, where the level cannot follow, it goes on. */
+/* The drift of each sensor's baseline in a calm, in which nothing touches and every baseline keeps up: from snapshots of the
+ * baselines of all sensors. In a contact, where the baseline cannot follow, it goes on. */
 #pragma once
 
 #include "condition/constants.h"
@@ -16,9 +16,9 @@ struct calm {
 
 /* Of one sensor. */
 struct drift {
-  int32_t drift_q16; /* of the level, 1/1024 Pa in 1.024 ms */
+  int32_t drift_q16; /* of the baseline, 1/1024 Pa in 1.024 ms */
   uint16_t rest_q16;
-  int32_t snapshot_Pa_q10[SNAPSHOTS]; /* of the level */
+  int32_t snapshot_Pa_q10[SNAPSHOTS]; /* of the baseline */
 };
 
 struct snapshot {
@@ -28,13 +28,13 @@ struct snapshot {
   int32_t span_ms; /* from the oldest that is left */
 };
 
-/* Whether a snapshot of all levels is due, and which. */
+/* Whether a snapshot of all baselines is due, and which. */
 bool calm_is_due(struct calm *calm, uint32_t now_ms, struct snapshot *snapshot);
 
 /* Takes it of one sensor, and sets its drift. */
-void calm_take(struct drift *drift, int32_t level_Pa_q10, const struct snapshot *snapshot);
+void calm_take(struct drift *drift, int32_t baseline_Pa_q10, const struct snapshot *snapshot);
 
-/* By how much the level has drifted in this time. */
+/* By how much the baseline has drifted in this time. */
 static inline int32_t calm_drift(struct drift *drift, int32_t ms) {
   const int32_t drift_q16 = drift->rest_q16 + drift->drift_q16 * ms;
   drift->rest_q16 = (uint16_t)drift_q16;

@@ -68,11 +68,11 @@ static void take(struct condition *condition, uint8_t k, int32_t reading_Pa_q10)
     return;
   }
   const int32_t mean = mean_of(sensor->tare_sum - sensor->tare_min - sensor->tare_max, taken - 2);
-  const int32_t level = clamp(mean, -LEVEL_MAX, LEVEL_MAX);
-  sensor->level_Pa_q10 = sensor->rests_Pa_q10 = sensor->before_Pa_q10 = sensor->slow_Pa_q10 = level;
+  const int32_t baseline = clamp(mean, -BASELINE_MAX, BASELINE_MAX);
+  sensor->baseline_Pa_q10 = sensor->rests_Pa_q10 = sensor->before_Pa_q10 = sensor->slow_Pa_q10 = baseline;
   sensor->updated_ms = condition->now_ms;
   condition->taring &= ~sensor_bit(k);
-  condition->zero_Pa_q10[k] = level;
+  condition->zero_Pa_q10[k] = baseline;
   condition->margin_Pa_q10[k] = sensor->spread_Pa_q10;
   condition->tared_ms = 0;
   condition->calm.snapshots = 0;
@@ -187,7 +187,7 @@ static void watch_calm(struct condition *condition, const struct conditioned *co
                     condition->tared_ms >= CALM_AFTER_TARE_ms && condition->gate.released_ms >= CALM_AFTER_RELEASE_ms;
   if (calm && calm_is_due(&condition->calm, condition->now_ms, &snapshot)) {
     for (uint8_t k = 0; k < count; k++) {
-      calm_take(&condition->sensor[k].drift, condition->sensor[k].level_Pa_q10, &snapshot);
+      calm_take(&condition->sensor[k].drift, condition->sensor[k].baseline_Pa_q10, &snapshot);
     }
   }
 }

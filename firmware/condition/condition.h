@@ -5,25 +5,25 @@
  * them the gate decides whether anything touches. Every UPDATE_ms each sensor is updated (update.h): one pass over all
  * that is remembered of it. Its zero has two parts.
  *
- * Level: what the sensor reads when nothing touches.
+ * Baseline: what the sensor reads when nothing touches.
  * - Taken: the mean of ZERO_TARE_FRAMES readings without the smallest and the largest; at rates below 16 Hz of three
  * and more.
- * - Settled: rubber and sensors warm up. A level that was just taken may be off by its spread, ZERO_COLD_Pa for a
- * sensor that was off or is another, ZERO_WARM_Pa for one that was calm before. While there is a spread the level takes over all readings
- * within it, and the gate is higher by it: a weaker touch is not seen. The spread fades by evidence, to three times what the reading moves
- * in a second. A calm sensor has none after two seconds, one that creeps after fifteen.
- * - Followed: then the level moves at 0.5 Pa/s. A force that rises faster is no drift. In a contact it does not move,
+ * - Settled: rubber and sensors warm up. A baseline that was just taken may be off by its spread, ZERO_COLD_Pa for a
+ * sensor that was off or is another, ZERO_WARM_Pa for one that was calm before. While there is a spread the baseline takes over all
+ * readings within it, and the gate is higher by it: a weaker touch is not seen. The spread fades by evidence, to three times what the
+ * reading moves in a second. A calm sensor has none after two seconds, one that creeps after fifteen.
+ * - Followed: then the baseline moves at 0.5 Pa/s. A force that rises faster is no drift. In a contact it does not move,
  * except for the drift of the calm before it (calm.h), for an hour.
- * - Taken again: a reading below what a release explains means that the level was taken under a press. The sensor is
+ * - Taken again: a reading below what a release explains means that the baseline was taken under a press. The sensor is
  * tared again after ZERO_BELOW_s, or after half a second if it is far below. Rubber that bulged beside that press may be above its zero
  * then, which seems to be a contact: where a sensor is below by more than eight times what any is above, all are tared again.
  *
  * Remainder: what rubber keeps of a press, which cannot be distinguished from a remaining force.
  * - Each sensor remembers its strongest press; the memory fades in 20 s. Three quarters of the pad's strongest
  * memory count for all. An eighth of the memory is the band, or twice the share that this sensor has kept of others: this may remain
- * above the level, and a quarter below. A contact closes within it.
+ * above the baseline, and a quarter below. A contact closes within it.
  * - After a contact the remainder follows the reading within the band. It rises only for two seconds, and never as fast
- * as a press. Then a sudden press opens the gate above half of the band, and the level takes over the remainder slowly.
+ * as a press. Then a sudden press opens the gate above half of the band, and the baseline takes over the remainder slowly.
  * - A long contact leaves a drift too, as far as a barometer may have drifted in it.
  *
  * Hysteresis: what rubber keeps of a press shows at rest, and goes on for 1 to 4 s in the next contact.
@@ -33,13 +33,13 @@
  * - That share is uncertain, and so is what a hold itself changes in this sensor alone: hysteresis_sd_Pa_q10 is the sd of both. The first
  * is a part of what was released. The second rises in a hold and fades with HOLD_ms; its share is the size of what is left after contacts.
  *
- * The level of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
+ * The baseline of a sensor does not move while the gate is open, nor while the temperature of the sensor is unsettled. It
  * is taken again if it was taken in the five seconds before its sensor was reset as it had lost its state, or stepped
  * alone. No single sensor is tared in a contact that others measure. It waits for eight seconds at most, since wrong
  * zeros may make that contact. Such a zero is a guess until the contact ends. Then it is taken again.
  *
- * Doubt: a zero that has moved and a force may look alike. A zero may be off by what it took: wander is what the level
- * moved, taken is what level and remainder moved since the zero was proven. A press without doubt proves it: what the
+ * Doubt: a zero that has moved and a force may look alike. A zero may be off by what it took: wander is what the baseline
+ * moved, taken is what baseline and remainder moved since the zero was proven. A press without doubt proves it: what the
  * zero comes back to after that press is the zero. Without evidence both fade in minutes. Doubtful is
  * - a contact in which no sensor measures more than its zero wandered, half as much again; or no more than barometers
  * drift in such a time; or while a zero is a guess. This one is unsure: the zero follows it slowly, as if nothing touched
@@ -69,7 +69,7 @@ struct gate {
 
 /* All that is remembered of one sensor. */
 struct condition_sensor {
-  int32_t level_Pa_q10;
+  int32_t baseline_Pa_q10;
   int32_t rests_Pa_q10;         /* where the zero goes in a contact, once what rubber keeps has faded */
   int32_t spread_Pa_q10;        /* 0: settled */
   int32_t memory_Pa_q10;        /* strongest press, fading */
@@ -106,7 +106,7 @@ struct condition {
 
   sensor_map taring;     /* bitmap: tare_left is not 0 */
   sensor_map guessed;    /* bitmap: tared in a contact that others measure */
-  sensor_map restless;   /* bitmap: the level does not keep up, no calm */
+  sensor_map restless;   /* bitmap: the baseline does not keep up, no calm */
   sensor_map below;      /* bitmap: too far below zero */
   sensor_map firm;       /* bitmap: stronger than what the zero has wandered */
   sensor_map sudden;     /* bitmap: stronger than what may have crept up */
@@ -122,7 +122,7 @@ struct condition {
   struct gate gate;
   struct calm calm;
 
-  int32_t zero_Pa_q10[FT_MAX_SENSORS];          /* [sensor] 1/1024 Pa, as all here: level + remainder */
+  int32_t zero_Pa_q10[FT_MAX_SENSORS];          /* [sensor] 1/1024 Pa, as all here: baseline + remainder */
   int32_t faded_Pa_q10[FT_MAX_SENSORS];         /* of the remainder, in this contact, less what the rubber has kept of it */
   int32_t margin_Pa_q10[FT_MAX_SENSORS];        /* by which the gate is higher */
   int32_t hysteresis_sd_Pa_q10[FT_MAX_SENSORS]; /* of a reading: what a press before and this hold leave in it */

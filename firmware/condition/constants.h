@@ -12,7 +12,7 @@
 
 /* Range. */
 #define PRESSURE_MAX (INT32_C(1) << 29) /* 1/1024 Pa, 0.5 MPa: most that is multiplied by a share */
-#define LEVEL_MAX (INT32_C(1) << 30)    /* 1/1024 Pa, 1 MPa: the part ends near 0.5 MPa */
+#define BASELINE_MAX (INT32_C(1) << 30) /* 1/1024 Pa, 1 MPa: the part ends near 0.5 MPa */
 #define SUM_RANGE (INT32_C(1) << 23)    /* 1/1024 Pa, 8 kPa: a reading in a mean, so that 255 of them fit */
 
 /* Gate: opens above OPEN, closes below CLOSE, each plus SIGMA standard deviations of the noise. */
@@ -30,7 +30,7 @@
 #define ZERO_COLD_Pa 350                     /* spread after power-up; strips: twice 0.16 kPa of rise */
 #define ZERO_WARM_Pa 60                      /* spread of a sensor that was calm before; choice */
 
-/* Settling of the level. */
+/* Settling of the baseline. */
 #define SETTLE_ms MS(500)                         /* time constant of the spread; choice */
 #define SETTLE_LONGEST_ms ((uint32_t)SECONDS(15)) /* a sensor that creeps counts as settled then; choice */
 #define SETTLED_Pa 8                              /* and a sigma: a smaller spread is none */
@@ -38,13 +38,13 @@
 
 /* Following. */
 #define SLEW_SHIFT 1                               /* 0.5 Pa/s; strips at rest: 130 to 210 Pa in 16 min, 0.22 Pa/s at most */
-#define FOLLOW_ms SECONDS(2)                       /* time constant of the level; choice */
+#define FOLLOW_ms SECONDS(2)                       /* time constant of the baseline; choice */
 #define KEEP_DOWN_SHIFT 2                          /* a quarter of a remainder downward: what dipped comes back */
 #define DRIFT_GOES_ON_ms ((uint32_t)SECONDS(3600)) /* the drift before a contact holds in it for an hour; choice */
 #define STILL_SIGMA 3                              /* a rise of 3 sigma between two updates is no remainder's */
 #define FALL_SHIFT 2                               /* nor a fall by a quarter of the pressure */
 
-/* Below the zero: the level was taken under a press. */
+/* Below the zero: the baseline was taken under a press. */
 #define ZERO_BELOW_s 10                /* strips: dips come back within it */
 #define BELOW_ms SECONDS(ZERO_BELOW_s) /* the same */
 #define FAR_BELOW_Pa 1000              /* farther below no wait is needed; choice */
@@ -74,7 +74,7 @@
 #define FRESH_ms ((uint32_t)SECONDS(2))         /* after a contact: a remainder may rise */
 #define REMAINDER_ms MS(700)                    /* time constant of a remainder; strips: 0.5 s at least */
 #define REMAINDER_DOWN_ms MS(100)               /* the same when a force goes at last */
-#define KEEP_SHIFT 8                            /* 1/256 of the memory in a second: the level takes over the remainder, */
+#define KEEP_SHIFT 8                            /* 1/256 of the memory in a second: the baseline takes over the remainder, */
 #define CREEP_SHIFT 10                          /* 1/1024: what the remainder does not follow, */
 #define DRIFTED_SHIFT 3                         /* and an eighth of what may have drifted */
 #define DRIFT_SHIFT 2                           /* 0.24 Pa/s: drift of a contact; strips: 0.22 Pa/s */
@@ -88,16 +88,16 @@
 #define CREPT_MAX_Pa 2500      /* of those 2 kPa and a quarter */
 #define TAKEN_FACTOR 3         /* a contact of 3 times what its zeros took is off by a third; at 4 a strip fails */
 
-/* Drift of a calm: the level's, from snapshots. */
-#define SNAPSHOTS 8                                   /* of the level; after the eighth every other one goes */
+/* Drift of a calm: the baseline's, from snapshots. */
+#define SNAPSHOTS 8                                   /* of the baseline; after the eighth every other one goes */
 #define SNAPSHOT_ms ((uint32_t)SECONDS(4))            /* interval, at first */
 #define SNAPSHOT_LONGEST_ms ((uint32_t)SECONDS(64))   /* at last: 8 of them span 512 s */
 #define CALM_AFTER_TARE_ms ((uint32_t)SECONDS(3))     /* begin of a calm after a tare, */
 #define CALM_AFTER_RELEASE_ms ((uint32_t)SECONDS(60)) /* and after a contact: what rubber keeps goes slowly */
-#define CALM_LAG_Pa 2                                 /* and half a sigma: most that a calm reading is above the level */
+#define CALM_LAG_Pa 2                                 /* and half a sigma: most that a calm reading is above the baseline */
 #define DRIFT_LEAST_s 8                               /* shorter calms show no drift */
 #define DRIFT_LONGEST_s 512                           /* longer ones count as this; range of the products */
-#define DRIFT_CHANGE_MAX_Pa 300                       /* of the level in a calm; range: 0.5 Pa/s for 512 s is less */
-#define DRIFT_FASTEST_q12 1280                        /* 0.31 Pa/s: at more the level is too slow to know the drift after a minute */
+#define DRIFT_CHANGE_MAX_Pa 300                       /* of the baseline in a calm; range: 0.5 Pa/s for 512 s is less */
+#define DRIFT_FASTEST_q12 1280                        /* 0.31 Pa/s: at more the baseline is too slow to know the drift after a minute */
 #define DRIFT_SD_mPa_s 250                            /* standard deviation of drifts; strips: 0.22 Pa/s at most */
-#define LEVEL_SD_mPa 1000                             /* of a change of the level between two snapshots */
+#define BASELINE_SD_mPa 1000                          /* of a change of the baseline between two snapshots */

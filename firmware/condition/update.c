@@ -19,11 +19,11 @@ struct step {
   bool moves;             /* the reading moved as in a press or a release */
 };
 
-/* What may remain after a contact, and how fast the level takes it over. */
+/* What may remain after a contact, and how fast the baseline takes it over. */
 struct band {
   int32_t lowest_Pa_q10, highest_Pa_q10;
   int32_t margin_Pa_q10;    /* by which a press has to be stronger */
-  int32_t above_Pa_q10_s;   /* the level moves faster by this towards the reading, */
+  int32_t above_Pa_q10_s;   /* the baseline moves faster by this towards the reading, */
   int32_t remains_Pa_q10_s; /* and towards the remainder; 1/1024 Pa in a second */
 };
 
@@ -37,7 +37,7 @@ static int32_t may_remain(const struct condition_sensor *sensor, int32_t of_Pa_q
 }
 static void follow_hysteresis(const struct step *step) { (void)step; }
 static void forget_hysteresis(struct condition_sensor *sensor) { (void)sensor; }
-static void follow_rest(const struct step *step) { step->sensor->rests_Pa_q10 = step->sensor->level_Pa_q10; }
+static void follow_rest(const struct step *step) { step->sensor->rests_Pa_q10 = step->sensor->baseline_Pa_q10; }
 #else
 /* By how much a sensor reads above where it rests and its pressure. */
 static int32_t retained_of(const struct condition_sensor *sensor) { return (sensor->released_Pa_q10 >> 10) * sensor->retained_q16 >> 6; }
@@ -64,7 +64,7 @@ static bool is_left_by_force(const struct condition *condition, sensor_map usabl
   for (uint8_t k = 0; usable != 0; k++, usable >>= 1) {
     const struct condition_sensor *sensor = &condition->sensor[k];
     if (usable & 1u && sensor->released_Pa_q10 > Pa_q10(HYSTERESIS_LEAST_Pa)) {
-      const int32_t off = clamped_difference(sensor->before_Pa_q10, sensor->level_Pa_q10);
+      const int32_t off = clamped_difference(sensor->before_Pa_q10, sensor->baseline_Pa_q10);
       if (off <= part_of(sensor->released_Pa_q10, HYSTERESIS_FORCE)) {
         return false;
       }
@@ -202,7 +202,7 @@ static void hold(const struct step *step) {
   set_bit(&condition->below, step->k, false);
   if (condition->gate.pressed_ms < DRIFT_GOES_ON_ms) {
     const int32_t drifted = calm_drift(&sensor->drift, step->ms);
-    sensor->level_Pa_q10 += drifted;
+    sensor->baseline_Pa_q10 += drifted;
     sensor->rests_Pa_q10 += drifted;
     condition->zero_Pa_q10[step->k] += drifted;
   }
@@ -214,20 +214,19 @@ static void hold(const struct step *step) {
   condition->margin_Pa_q10[step->k] += *off;
 }
 
-/* The zero is what level and remainder are now: what it may be off by grows by what they have moved. */
-static void set_zero(const struct step *step, int32_t remainder_Pa_q10, int32_t level_moved_Pa_q10, int32_t moved_Pa_q10) {
+/* The zero is what baseline and remainder are now: what it may be off by grows by what they have moved. */
+static void set_zero(const struct step *step, int32_t remainder_Pa_q10, int32_t baseline_moved_Pa_q10, int32_t moved_Pa_q10) {
   struct condition *condition = step->condition;
   struct condition_sensor *sensor = step->sensor;
   const int32_t spread = sensor->spread_Pa_q10;
-  condition->zero_Pa_q10[step->k] = sensor->level_Pa_q10 + remainder_Pa_q10;
-  sensor->wander_Pa_q10 = faded(sensor->wander_Pa_q10, step->wander_share) + level_moved_Pa_q10;
+  condition->zero_Pa_q10[step->k] = sensor->baseline_Pa_q10 + remainder_Pa_q10;
+  sensor->wander_Pa_q10 = faded(sensor->wander_Pa_q10, step->wander_share) + baseline_moved_Pa_q10;
   sensor->taken_Pa_q10 = faded(sensor->taken_Pa_q10, step->wander_share) + moved_Pa_q10;
   sensor->crept_Pa_q10 = spread > 0 ? 0 : sensor->crept_Pa_q10;
   set_bit(&condition->zero_risen, step->k, larger(sensor->taken_Pa_q10, spread) > condition->gate.open_Pa_q10);
 }
 
-/* While the level may be off by a spread it takes over all readings within it: so nothing shows what rubber keeps. Returns whether it has.
- */
+/* While the baseline may be off by a spread it takes over all readings within it. Returns whether it has: nothing shows hysteresis then. */
 static bool settle(const struct step *step) {
   struct condition *condition = step->condition;
   struct condition_sensor *sensor = step->sensor;
@@ -236,7 +235,7 @@ static bool settle(const struct step *step) {
     return false;
   }
   condition->to_learn &= ~sensor_bit(step->k);
-  sensor->level_Pa_q10 += step->above_Pa_q10;
+  sensor->baseline_Pa_q10 += step->above_Pa_q10;
   int32_t goal = SETTLE_SLOW * size_of(step->slow_Pa_q10);
   goal = goal > spread ? spread : goal;
   spread += part_of(goal - spread, share_in(step->ms, SETTLE_ms));
@@ -275,16 +274,16 @@ static int32_t follow_remainder(const struct step *step, const struct band *band
   return remainder + part_of(goal - remainder, share_in(step->ms, down ? REMAINDER_DOWN_ms : REMAINDER_ms));
 }
 
-/* The level follows reading and remainder, at 0.5 Pa/s and what the band allows. Leaves what it has not taken of the
+/* The baseline follows reading and remainder, at 0.5 Pa/s and what the band allows. Leaves what it has not taken of the
  * remainder. Returns by how much it moved. */
-static int32_t follow_level(const struct step *step, const struct band *band, bool keeps, int32_t *remainder) {
+static int32_t follow_baseline(const struct step *step, const struct band *band, bool keeps, int32_t *remainder) {
   const int32_t slew = step->ms >> SLEW_SHIFT, share = share_in(step->ms, FOLLOW_ms);
   int32_t most = slew + in_step(band->above_Pa_q10_s, step->ms);
   const int32_t crept = clamp(part_of(step->above_Pa_q10, share), -most, most);
   most = keeps ? slew + in_step(band->remains_Pa_q10_s, step->ms) : 0;
   const int32_t kept = clamp(part_of(*remainder, share), -(most >> KEEP_DOWN_SHIFT), most);
   *remainder -= kept;
-  step->sensor->level_Pa_q10 += crept + kept;
+  step->sensor->baseline_Pa_q10 += crept + kept;
   return crept + kept;
 }
 
@@ -297,7 +296,7 @@ static void tare_below(struct condition *condition, uint8_t k, int32_t above_Pa_
 
 /* A sensor that has been below was tared under a press, and so were all others: those that are far below now are tared with it, at their
  * next update, and those beside them settle. */
-static void tare_again(struct condition *condition, uint8_t k, bool far, int32_t above_level_Pa_q10) {
+static void tare_again(struct condition *condition, uint8_t k, bool far, int32_t above_baseline_Pa_q10) {
   for (uint8_t j = 0; j < FT_MAX_SENSORS; j++) {
     struct condition_sensor *other = &condition->sensor[j];
     other->spread_Pa_q10 = larger(other->spread_Pa_q10, Pa_q10(ZERO_WARM_Pa));
@@ -305,18 +304,18 @@ static void tare_again(struct condition *condition, uint8_t k, bool far, int32_t
       other->below_ms = BELOW_ms;
     }
   }
-  tare_below(condition, k, above_level_Pa_q10);
+  tare_below(condition, k, above_baseline_Pa_q10);
 }
 
-/* lowest_Pa_q10: a reading above the level that is lower is below all that a release explains. */
-static void watch_below(const struct step *step, int32_t above_level_Pa_q10, int32_t lowest_Pa_q10) {
+/* lowest_Pa_q10: a reading above the baseline that is lower is below all that a release explains. */
+static void watch_below(const struct step *step, int32_t above_baseline_Pa_q10, int32_t lowest_Pa_q10) {
   struct condition_sensor *sensor = step->sensor;
-  const int32_t under = lowest_Pa_q10 - above_level_Pa_q10;
+  const int32_t under = lowest_Pa_q10 - above_baseline_Pa_q10;
   const bool far = under > Pa_q10(FAR_BELOW_Pa);
   sensor->below_ms = under > 0 ? (uint16_t)(sensor->below_ms + step->ms) : 0;
   set_bit(&step->condition->below, step->k, under > 0);
   if (sensor->below_ms >= (far ? FAR_BELOW_ms : BELOW_ms)) {
-    tare_again(step->condition, step->k, far, above_level_Pa_q10);
+    tare_again(step->condition, step->k, far, above_baseline_Pa_q10);
   }
 }
 
@@ -333,19 +332,19 @@ static void follow(const struct step *step) {
   const int32_t before = condition->zero_Pa_q10[step->k];
   const bool fresh = condition->gate.released_ms < FRESH_ms;
   const struct band band = band_of(step, fresh);
-  int32_t remainder = before - sensor->level_Pa_q10;
-  const int32_t above_level = step->above_Pa_q10 + remainder;
+  int32_t remainder = before - sensor->baseline_Pa_q10;
+  const int32_t above_baseline = step->above_Pa_q10 + remainder;
   if (!unsure) {
     follow_rest(step);
     remainder = follow_remainder(step, &band, fresh, remainder);
   }
   const struct band none = {0};
-  const int32_t level_moved = follow_level(step, unsure ? &none : &band, !unsure, &remainder);
-  sensor->rests_Pa_q10 += unsure ? level_moved : 0;
-  set_zero(step, remainder, level_moved, sensor->level_Pa_q10 + remainder - before);
+  const int32_t baseline_moved = follow_baseline(step, unsure ? &none : &band, !unsure, &remainder);
+  sensor->rests_Pa_q10 += unsure ? baseline_moved : 0;
+  set_zero(step, remainder, baseline_moved, sensor->baseline_Pa_q10 + remainder - before);
   condition->margin_Pa_q10[step->k] = (unsure ? 0 : band.margin_Pa_q10) + sensor->spread_Pa_q10;
-  set_bit(&condition->restless, step->k, size_of(above_level) > Pa_q10(CALM_LAG_Pa) + step->noise_Pa_q10 / 2);
-  watch_below(step, above_level, band.lowest_Pa_q10 - condition->gate.open_Pa_q10);
+  set_bit(&condition->restless, step->k, size_of(above_baseline) > Pa_q10(CALM_LAG_Pa) + step->noise_Pa_q10 / 2);
+  watch_below(step, above_baseline, band.lowest_Pa_q10 - condition->gate.open_Pa_q10);
 }
 
 /* Whether this is no contact: a press under which the zeros were taken is over, and the rubber that bulged beside it is above them. */

@@ -6,7 +6,7 @@
 /* Updates sensor k with the frame just processed. */
 void update_sensor(struct condition *condition, const struct frame *frame, const struct conditioned *conditioned, uint8_t k);
 
-/* Begins a tare of sensor k: until it ends there is no answer from it. The new level may be off by the spread. */
+/* Begins a tare of sensor k: until it ends there is no answer from it. The new baseline may be off by the spread. */
 void update_begin_tare(struct condition *condition, uint8_t k, int32_t spread_Pa_q10);
 
 /* Whether the pressure of sensor k is more than its zero may have moved: sets its bits of firm and sudden. */

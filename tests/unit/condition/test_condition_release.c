@@ -175,7 +175,7 @@ TEST(test_what_a_press_leaves_is_taken_back_by_the_next_or_fades_in_it) {
   }
 }
 
-/* Nor of what many presses left, which the level has followed. Where the contact moves on, what the sensor keeps is known. */
+/* Nor of what many presses left, which the baseline has followed. Where the contact moves on, what the sensor keeps is known. */
 TEST(test_what_many_presses_leave_fades_in_the_next_one_and_is_known_as_it_moves_on) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
     const float share = i % 2 ? 0.04f : -0.04f;
