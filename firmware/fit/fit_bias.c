@@ -24,8 +24,9 @@ _Static_assert(UNKNOWNS == FIT_BIAS_UNKNOWNS, "the search has a column for each"
 #define TRACE_RATIO 2
 
 /* Shift of the location per Q / F, the larger of two, and Q / F per coefficient of the trace: medians over the objects of report truth on
- * 6 to 15 mm of rubber, seed 1. */
+ * 6 to 15 mm of rubber, seed 1. NARROW: below FIT_WIDTHS_SIGMA_MIN, where a dip that is not known leaves a trace as large as a pull's. */
 #define SHIFT_PER_PITCH 0.38f
+#define SHIFT_PER_PITCH_NARROW 0.55f
 #define SHIFT_PER_SIGMA 0.58f
 #define RATIO_PER_TRACE 14.7f
 /* Square of the largest coefficient that counts: Q / F of 1, which is what friction holds. */
@@ -71,8 +72,7 @@ enum { AT_X_Q12, AT_Y_Q12, READING_Q18, ERROR_Q4, OFF_X_Q12, OFF_Y_Q12, WIDER_Q1
 /* False: there is nothing to be seen in so few or such readings. */
 static bool prepare_rows(const struct fit_array *array, const int32_t *pressure_Pa_q10, const struct fit_settings *settings,
                          const struct fit_result *result, struct fit_bias_search *search) {
-  int32_t largest = 0;
-  int count = 0;
+  int32_t largest = 0, count = 0;
   for (int k = 0; k < array->sensor_count; k++) {
     if (result->used >> k & 1) {
       largest = pressure_Pa_q10[k] > largest ? pressure_Pa_q10[k] : largest;
@@ -228,8 +228,7 @@ static NOINLINE struct scaled find_trace(struct fit_bias_search *search) {
   int32_t freedom = search->count - UNKNOWNS;
   struct scaled found = fit_scaled_from(port_divide(left > 0 ? left : 0, freedom < 1 ? 1 : freedom), -2 * search->q[RESIDUAL]);
   variance = scaled_sub(found, variance).mantissa > 0 ? found : variance;
-  struct scaled expected = scaled_mul(fit_scaled_short(variance), scaled_add(form_x, per_y));
-  expected = fit_scaled_short(expected);
+  struct scaled expected = fit_scaled_short(scaled_mul(fit_scaled_short(variance), scaled_add(form_x, per_y)));
   struct scaled sure = {expected.mantissa * TRACE_RATIO, expected.exponent};
   if (scaled_sub(square, sure).mantissa <= 0) {
     return none;
@@ -252,9 +251,11 @@ void fit_bias_add(const struct fit_bias *bias, const struct fit_array *array, co
   if (!is_located(result) || (bias->known && bias->ratio == 0.0f)) {
     return;
   }
-  float by_pitch = SHIFT_PER_PITCH * array->pitch_mm;
-  float by_sigma = SHIFT_PER_SIGMA * result->sigma_mm;
-  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f, bias->known ? bias->ratio : FIT_BIAS_ASSUMED_RATIO,
+  const bool narrow = result->sigma_mm < FIT_WIDTHS_SIGMA_MIN * array->pitch_mm && !fit_has_dip(settings);
+  const float by_pitch = (narrow ? SHIFT_PER_PITCH_NARROW : SHIFT_PER_PITCH) * array->pitch_mm,
+              by_sigma = SHIFT_PER_SIGMA * result->sigma_mm;
+  const bool assumed = !bias->known || (narrow && bias->ratio > FIT_BIAS_ASSUMED_RATIO);
+  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f, assumed ? FIT_BIAS_ASSUMED_RATIO : bias->ratio,
                                           by_pitch > by_sigma ? by_pitch : by_sigma);
   if (result->location_sd_mm > fit_location_sd_limit_mm(settings)) {
     result->flags |= CONTACT_FLAG_UNCERTAIN;

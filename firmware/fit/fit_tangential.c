@@ -226,8 +226,7 @@ NOINLINE static void conclude(const struct problem *problem, const struct fit_ta
   struct scaled square = scaled_add(scaled_mul(e1, e1), scaled_mul(e2, e2));
   struct scaled amplitude = fit_scaled_from(at->amplitude_q24, -24);
   struct scaled round = scaled_mul(amplitude, fit_scaled_from(ONE_Q26 / 4 + at->t_q26, -26)); /* A v */
-  struct scaled longest = scaled_mul((struct scaled){pad->elongation_max_q15, -15}, round);
-  longest = fit_scaled_short(longest);
+  struct scaled longest = fit_scaled_short(scaled_mul((struct scaled){pad->elongation_max_q15, -15}, round));
   if (exceeds(square, scaled_mul(longest, longest))) {
     return;
   }
