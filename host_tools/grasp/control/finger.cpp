@@ -182,17 +182,15 @@ GripReading GripFinger::sample(double now_s, const GripSettings &settings) {
     reading.moved_x_N = reading.load_x_N = touch_.qx_N - load_zero_.x;
     reading.moved_y_N = reading.load_y_N = touch_.qy_N - load_zero_.y;
     reading.load_sd_N = std::max(touch_.q_sd_N, LOAD_SD_LEAST_N);
-    reading.speed_mm_s = std::hypot(touch_.speed_x_mm_s, touch_.speed_y_mm_s);
+    reading.load_N = std::hypot(reading.load_x_N, reading.load_y_N);
+    const double along = touch_.speed_x_mm_s * reading.load_x_N + touch_.speed_y_mm_s * reading.load_y_N;
+    reading.speed_mm_s = reading.load_N > SHARED_N ? along / reading.load_N : std::hypot(touch_.speed_x_mm_s, touch_.speed_y_mm_s);
+    // What carries no load does not slide, whatever the rubber does.
+    reading.slides = (touch_.flags & CONTACT_FLAG_SLIDING) != 0 && reading.load_N > SURE_SDS * reading.load_sd_N;
   } else if (reading.by_place) {
     reading.pulled_x = pulled_x_;
     reading.pulled_y = pulled_y_;
   }
-  reading.load_N = std::hypot(reading.load_x_N, reading.load_y_N);
-  // Moves against its load.
-  const bool recoils = reading.load_N > SHARED_N && touch_.speed_x_mm_s * reading.load_x_N + touch_.speed_y_mm_s * reading.load_y_N < 0.0;
-  // What carries no load does not slide, whatever the rubber does.
-  reading.slides = reading.contact && reading.has_load && (touch_.flags & CONTACT_FLAG_SLIDING) != 0 && !recoils &&
-                   reading.load_N > SURE_SDS * reading.load_sd_N;
   return reading;
 }
 
@@ -361,6 +359,7 @@ GripReadings combine_readings(std::array<GripFinger, GRIP_FINGERS> &fingers, dou
   } else {
     all.speed_mm_s = 0.0;
   }
+  all.slides = all.slides && all.speed_mm_s > 0.0;
   return all;
 }
 

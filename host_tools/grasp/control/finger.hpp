@@ -159,7 +159,7 @@ struct GripReadings {
   double keeps = 1.0, pull_N = 0.0; // GripFinger::mark: the most and the least of the marked fingertips; of none: all, and 0
   bool by_place = false;            // the load
   double ratio = 0.0;               // tangential over normal force, of the fingertips that have both
-  double speed_mm_s = 0.0;          // sliding speed at the slower fingertip
+  double speed_mm_s = 0.0;          // along the load, at the slower fingertip; below 0: one springs back, or the object rolls
   std::array<double, GRIP_FINGERS> force_N{};
   bool is_alone() const { return low_N < 0.5 * high_N; } // one fingertip carries most of the force
 };

@@ -17,7 +17,9 @@ extern "C" {
 namespace fingertip::test {
 
 // A gripper of fine steps that answers soon.
-inline GripperTraits fine_gripper() { return {{85.0, 0.01, 0.0, 1.0, 150.0, 20.0, 235.0, 0.003, 0.001}, "fine"}; }
+inline GripperTraits fine_gripper(double latency_s = 0.003) {
+  return {{85.0, 0.01, 0.0, 1.0, 150.0, 20.0, 235.0, latency_s, 0.001}, "fine"};
+}
 
 class GripWorld {
 public:

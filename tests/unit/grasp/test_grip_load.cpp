@@ -40,15 +40,18 @@ TEST(Grip, LearnsFrictionWhileItSlides) {
   expect_share(0.7 * held, world.report.friction, 0.08); // the grip grows meanwhile
 }
 
-// Rubber that springs back moves against its load: that is no slide, and teaches no friction.
+// Rubber that springs back moves against its load, and so does one contact of two that roll: that is no slide, and teaches no friction.
 TEST(Grip, WhatMovesAgainstItsLoadDoesNotSlide) {
-  GripWorld world;
-  world.carry(2.5, 0.3, 0.5);
-  const double friction = world.report.friction, before_N = world.force_N;
-  world.slide(0.3 * friction, -40.0, 0.2);
-  EXPECT_EQ(world.report.slides, 0u);
-  EXPECT_EQ(world.report.friction, friction);
-  EXPECT_LT(world.peak_N, 1.3 * before_N);
+  for (const double share : {1.0, -1.0}) {
+    GripWorld world;
+    world.load_share[1] = share;
+    world.carry(2.5, 0.3, 0.5);
+    const double friction = world.report.friction, before_N = world.force_N;
+    world.slide(0.3 * friction, -40.0, 0.2);
+    EXPECT_EQ(world.report.slides, 0u);
+    EXPECT_EQ(world.report.friction, friction);
+    EXPECT_LT(world.peak_N, 1.3 * before_N);
+  }
 }
 
 TEST(Grip, ASlideRaisesTheGripAtOnceAndEndsAtItsMargin) {
@@ -104,9 +107,7 @@ TEST(Grip, HoldsMoreFirmlyWhereFramesComeLate) {
 // A load that rises fast is expected to go on. Where it does not, the grip that was wanted for it
 // is given up before the gripper has made it.
 TEST(Grip, WhatWasExpectedAndHasNotComeIsNotPursued) {
-  GripperTraits slow = fine_gripper();
-  slow.latency_s = 0.025;
-  GripWorld world({{"cap", 15.0}}, slow); // each move shows before the next
+  GripWorld world({{"cap", 15.0}}, fine_gripper(0.025)); // each move shows before the next
   world.grasp();
   world.pull(2.0, 0.03);
   const double expected_N = world.report.wanted_N;
@@ -119,9 +120,7 @@ TEST(Grip, WhatWasExpectedAndHasNotComeIsNotPursued) {
 
 // A slide is still reported when the object has been caught already. What it asked for and is not under way is given up then.
 TEST(Grip, ASlideThatSlowsDownIsNotPursued) {
-  GripperTraits slow = fine_gripper();
-  slow.latency_s = 0.05;
-  GripWorld world({{"cap", 15.0}}, slow); // each move shows before the next
+  GripWorld world({{"cap", 15.0}}, fine_gripper(0.05)); // each move shows before the next
   world.grasp();
   world.pull(2.5, 0.03);
   const double expected_N = world.report.wanted_N;
@@ -202,9 +201,7 @@ TEST(Grip, NothingIsMissingWhereNoLoadIsTold) {
 
 // No fingertip has a tangential force; its place moves by what it would be.
 static GripWorld blind_world(double sigma_mm, double latency_s = 0.003) {
-  GripperTraits gripper = fine_gripper();
-  gripper.latency_s = latency_s;
-  GripWorld world({}, gripper);
+  GripWorld world({}, fine_gripper(latency_s));
   world.sigma_mm = sigma_mm;
   world.pulled_mm = 4.2;
   world.drop_flags = {CONTACT_FLAG_TANGENTIAL_VALID, CONTACT_FLAG_TANGENTIAL_VALID};
