@@ -1,8 +1,7 @@
 #include "grasp/fingertip_grip.h"
 
-#include "grasp/fingertip.hpp"
+#include "grasp/control/grip.hpp"
 #include "grasp/settings.hpp"
-#include "grasp/words.hpp"
 #include "libfingertip/fingertip_values.hpp"
 
 #include <algorithm>
@@ -47,7 +46,6 @@ static fingertip_status null() { return failed(FINGERTIP_ERR_ARGUMENT, "a pointe
 struct fingertip_grip {
   GripperTraits traits;
   Values wanted;
-  GripSettings settings;
   Grip grip;
 };
 
@@ -60,8 +58,7 @@ struct fingertip_grip *fingertip_grip_new(const struct fingertip_grip_traits *tr
     }
     const GripperTraits own = traits_of(*traits);
     const Values wanted = merged({}, names, values, count);
-    const GripSettings settings = settings_for(own, wanted, field_name);
-    made = new fingertip_grip{own, wanted, settings, Grip(settings, own)};
+    made = new fingertip_grip{own, wanted, Grip(settings_for(own, wanted, SettingName::field), own)};
     return FINGERTIP_OK;
   });
   return made;
@@ -75,11 +72,9 @@ enum fingertip_status fingertip_grip_set(struct fingertip_grip *grip, const char
       return null();
     }
     Values wanted = merged(grip->wanted, names, values, count);
-    const GripSettings settings = settings_for(grip->traits, wanted, field_name);
-    if (!grip->grip.change(settings)) {
+    if (!grip->grip.change(settings_for(grip->traits, wanted, SettingName::field))) {
       return failed(FINGERTIP_ERR_VALUE, "the mode cannot change: set_N chooses it at the beginning");
     }
-    grip->settings = settings;
     grip->wanted = std::move(wanted);
     return FINGERTIP_OK;
   });
@@ -90,8 +85,7 @@ enum fingertip_status fingertip_grip_setting(const struct fingertip_grip *grip, 
     if (!grip || !name || !value) {
       return null();
     }
-    GripSettings settings = grip->settings;
-    *value = setting_of_field(name).field(settings);
+    *value = grip->grip.settings().*setting_of_field(name).field;
     return FINGERTIP_OK;
   });
 }
@@ -138,7 +132,3 @@ enum fingertip_status fingertip_grip_step(struct fingertip_grip *grip, double no
   *command = {out.width_mm, out.speed_mm_s, out.force_N, out.motion};
   return FINGERTIP_OK;
 }
-
-size_t fingertip_grip_state_name(uint8_t state, char *text, size_t size) { return put_text(state_name(state), text, size); }
-
-size_t fingertip_grip_trouble_names(uint32_t trouble, char *text, size_t size) { return put_text(trouble_names(trouble), text, size); }

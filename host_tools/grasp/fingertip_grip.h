@@ -158,10 +158,6 @@ enum fingertip_status fingertip_grip_ask(struct fingertip_grip *grip, enum finge
 enum fingertip_status fingertip_grip_step(struct fingertip_grip *grip, double now_s, struct fingertip_grip_command *command,
                                           struct fingertip_grip_report *report);
 
-/* "slipping"; "finger_0_stale at_cap" */
-size_t fingertip_grip_state_name(uint8_t state, char *text, size_t size);
-size_t fingertip_grip_trouble_names(uint32_t trouble, char *text, size_t size);
-
 #ifdef __cplusplus
 }
 #endif

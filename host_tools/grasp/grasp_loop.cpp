@@ -1,6 +1,5 @@
 #include "grasp/grasp_loop.hpp"
 
-#include "grasp/fingertip.hpp"
 #include "grasp/words.hpp"
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"

@@ -21,8 +21,7 @@ struct Column {
   std::function<bool(std::string_view cell, GripRow &row)> read;
 };
 
-// field(row): a reference to it.
-// Not a number: unknown, where it may be; its cell is empty.
+// field(row): a reference to it. Not a number: unknown, where it may be; its cell is empty.
 template <typename Field> Column number(const char *name, Field field, bool is_of_status = false, bool may_be_unknown = false) {
   return {name, is_of_status, [=](const GripRow &row) { return std::isnan(field(row)) ? "" : fixed(field(row), 3); },
           [=](std::string_view cell, GripRow &row) {

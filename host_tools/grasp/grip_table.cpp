@@ -1,5 +1,4 @@
-// fingertip_grip_table: prints host_tools/python/fingertip/grip_table.py, the names of grasps in
-// Python: settings, grippers, states, troubles, requests.
+// fingertip_grip_table: prints host_tools/python/fingertip/grip_table.py: settings, grippers, states, troubles, requests.
 #include "grasp/gripper/gripper.hpp"
 #include "grasp/settings.hpp"
 #include "grasp/words.hpp"
@@ -13,7 +12,7 @@ static void print_settings() {
   std::printf("\n\n@dataclasses.dataclass(frozen=True)\nclass Settings:\n"
               "    \"\"\"None: the default of the gripper. set_N chooses the mode that holds this force.\"\"\"\n\n");
   for (const GraspSetting &setting : grasp_settings()) {
-    std::printf("    %s: float | None = None\n    \"\"\"%s; %.10g to %.10g\"\"\"\n", field_name(setting).c_str(), setting.help,
+    std::printf("    %s: float | None = None\n    \"\"\"%s; %.10g to %.10g\"\"\"\n", setting.field_name, setting.help,
                 setting.low * setting.scale, setting.high * setting.scale);
   }
 }

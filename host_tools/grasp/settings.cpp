@@ -33,14 +33,12 @@ GripSettings default_settings(const GripperTraits &traits) {
   settings.cap_N = std::max(settings.cap_N, CAP_OVER_LEAST_FORCE * traits.force_min_N);
   settings.release_width_mm = traits.stroke_mm;
   const double dead_s = traits.latency_s + traits.poll_s + FINGERTIP_DELAY_s;
-  settings.gains.ki_mm_Ns = std::clamp(INTEGRAL_mm_N / dead_s, INTEGRAL_LEAST_mm_Ns, INTEGRAL_MOST_mm_Ns);
+  settings.ki_mm_Ns = std::clamp(INTEGRAL_mm_N / dead_s, INTEGRAL_LEAST_mm_Ns, INTEGRAL_MOST_mm_Ns);
   settings.start_N = START_N + START_N_mm * traits.step_mm;
   settings.floor_N = std::max(FLOOR_N - FLOOR_N_mm * traits.step_mm, FLOOR_LEAST_N);
   settings.margin = std::max(MARGIN + MARGIN_1_s * traits.latency_s - MARGIN_1_mm * traits.step_mm, MARGIN_LEAST);
   return settings;
 }
-
-using S = GripSettings;
 
 constexpr const char *FIXED = "fixed";
 
@@ -50,7 +48,7 @@ constexpr double GENTLE_mm_s = 4.0; // approach to what breaks
 
 [[noreturn]] void impossible(const std::string &text) { throw Error(ErrorCode::bad_value, text); }
 
-#define OF(member) #member, [](S & s) -> double & { return s.member; }
+#define OF(member) #member, &GripSettings::member
 
 const std::vector<GraspSetting> &grasp_settings() {
   static const std::vector<GraspSetting> all = {
@@ -76,24 +74,20 @@ const std::vector<GraspSetting> &grasp_settings() {
       {"late", "ms", 5, 500, 1e-3, OF(late_s), "Report frames that arrive older than this"},
       {"silent", "ms", 20, 5000, 1e-3, OF(silent_s), "Timeout of the gripper"},
       {"differ", "%", 5, 100, 0.01, OF(differ), "Warn if the fingertips' forces differ by more at rest"},
-      {"kp", "um/N", 0, 10000, 1e-3, OF(gains.kp_mm_N), "With --fixed: the published controller's proportional gain"},
-      {"ki", "um/(N s)", 0, 100000, 1e-3, OF(gains.ki_mm_Ns), "Its gain of the integral"},
-      {"kd", "um s/N", 0, 10000, 1e-3, OF(gains.kd_mm_s_N), "Its gain of the derivative"},
+      {"kp", "um/N", 0, 10000, 1e-3, OF(kp_mm_N), "With --fixed: the published controller's proportional gain"},
+      {"ki", "um/(N s)", 0, 100000, 1e-3, OF(ki_mm_Ns), "Its gain of the integral"},
+      {"kd", "um s/N", 0, 10000, 1e-3, OF(kd_mm_s_N), "Its gain of the derivative"},
       {"control", "ms", 0.5, 1000, 1e-3, OF(control_s), "Time between two of its steps"},
   };
   return all;
 }
 
-std::string option_name(const GraspSetting &setting) { return std::string("--") + setting.name; }
-
-std::string field_name(const GraspSetting &setting) { return std::string(split(setting.path, '.').back()); }
-
 const GraspSetting &setting_of_field(const std::string &name) {
-  const auto *found = find_in(grasp_settings(), [&](const GraspSetting &setting) { return field_name(setting) == name; });
+  const auto *found = find_in(grasp_settings(), [&](const GraspSetting &setting) { return name == setting.field_name; });
   return found ? *found : throw Error(ErrorCode::bad_value, "no setting " + printable(name));
 }
 
-double value_of(const GraspSetting &setting, GripSettings settings) { return setting.field(settings) / setting.scale; }
+double value_of(const GraspSetting &setting, const GripSettings &settings) { return settings.*setting.field / setting.scale; }
 
 const std::vector<GraspPreset> &grasp_presets() {
   static const std::vector<GraspPreset> all = {{"egg", 25.0}, {"strawberry", 5.0}, {"cup", 3.0}, {"crisp", 1.5}};
@@ -101,7 +95,7 @@ const std::vector<GraspPreset> &grasp_presets() {
 }
 
 std::map<std::string, double> breaking_values(double breaks_N) {
-  const S usual;
+  const GripSettings usual;
   return {{"cap", std::min(CAP * breaks_N, usual.cap_N)},
           {"start", std::min(START * breaks_N, usual.start_N)},
           {"floor", std::min(FLOOR * breaks_N, usual.floor_N)},
@@ -136,21 +130,24 @@ std::map<std::string, double> limits_of(const std::vector<std::string_view> &wor
 GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted, SettingName called) {
   GripSettings settings = default_settings(traits);
   settings.mode = wanted.count(FIXED) != 0 ? GRIP_MODE_FIXED : GRIP_MODE_HOLD;
+  const auto text_of = [&](const GraspSetting &setting) {
+    return called == SettingName::field ? setting.field_name : std::string("--") + setting.name;
+  };
   for (const GraspSetting &setting : grasp_settings()) {
     const auto value = wanted.find(setting.name);
     if (value == wanted.end()) {
       continue;
     }
     if (!(value->second >= setting.low && value->second <= setting.high)) {
-      const double scale = called == field_name ? setting.scale : 1.0;
+      const double scale = called == SettingName::field ? setting.scale : 1.0;
       const std::string unit = scale == 1.0 && *setting.unit ? std::string(" ") + setting.unit : "";
-      impossible(called(setting) + " is not possible; give " + shortest(static_cast<float>(scale * setting.low)) + " to " +
+      impossible(text_of(setting) + " is not possible; give " + shortest(static_cast<float>(scale * setting.low)) + " to " +
                  shortest(static_cast<float>(scale * setting.high)) + unit);
     }
-    setting.field(settings) = value->second * setting.scale;
+    settings.*setting.field = value->second * setting.scale;
   }
   const auto name_of = [&](const char *name) {
-    return called(*find_in(grasp_settings(), [&](const GraspSetting &setting) { return name == std::string(setting.name); }));
+    return text_of(*find_in(grasp_settings(), [&](const GraspSetting &setting) { return name == std::string(setting.name); }));
   };
   const auto follow = [&](const char *name, double &field, double low, double high, const std::string &limit) {
     if (field < low || field > high) {

@@ -14,18 +14,17 @@ struct GraspSetting {
   const char *name; // of the option, without --
   const char *unit; // "" for a ratio
   double low, high;
-  double scale;     // field = value * scale
-  const char *path; // of the field: "gains.kp_mm_N"
-  double &(*field)(GripSettings &settings);
+  double scale; // field = value * scale
+  const char *field_name;
+  double GripSettings::*field;
   const char *help;
 };
 
 const std::vector<GraspSetting> &grasp_settings();
 // By the name of its field: "kp_mm_N". Throws Error, bad_value: there is none.
-std::string field_name(const GraspSetting &setting);
 const GraspSetting &setting_of_field(const std::string &name);
 
-double value_of(const GraspSetting &setting, GripSettings settings);
+double value_of(const GraspSetting &setting, const GripSettings &settings);
 
 // What an object is like: the force that breaks it.
 struct GraspPreset {
@@ -40,12 +39,12 @@ std::map<std::string, double> breaking_values(double breaks_N);
 // Of NAME=VALUE each. Throws Error, bad_value.
 std::map<std::string, double> limits_of(const std::vector<std::string_view> &words);
 
-// How a message names a setting and its range: as an option in its unit, or field_name in that of the field.
-using SettingName = std::string (*)(const GraspSetting &setting);
-std::string option_name(const GraspSetting &setting);
+// How a message names a setting and its range: as an option in its unit, or as its field in the field's.
+enum class SettingName { option, field };
 // Defaults of this gripper, overridden by the wanted values, by name. "fixed" chooses that mode. Throws Error, code
 // bad_value: a value out of range, or one that contradicts another; a gripper one of whose steps may exceed the cap.
-GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted, SettingName called = option_name);
+GripSettings settings_for(const GripperTraits &traits, const std::map<std::string, double> &wanted,
+                          SettingName called = SettingName::option);
 
 // For a recording's head: grasp_mode, grasp_touch_N, ...
 Metadata settings_metadata(const GripSettings &settings);

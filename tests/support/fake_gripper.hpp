@@ -24,13 +24,13 @@ public:
     return motion_.status();
   }
   double width_mm() { return status().width_mm; }
-  void move(const fingertip::GripperMove &move) {
+  void move(const fingertip::GripCommand &move) {
     std::lock_guard lock(mutex_);
     advance();
     moves_.push_back(move);
     motion_.move(move);
   }
-  std::vector<fingertip::GripperMove> moves() {
+  std::vector<fingertip::GripCommand> moves() {
     std::lock_guard lock(mutex_);
     return moves_;
   }
@@ -45,7 +45,7 @@ private:
   std::mutex mutex_;
   fingertip::GripperMotion motion_{fingertip::gripper_mechanics("ideal"), 50.0};
   std::int64_t at_us_ = fingertip::steady_now_us();
-  std::vector<fingertip::GripperMove> moves_;
+  std::vector<fingertip::GripCommand> moves_;
 };
 
 class FakeGripper : public fingertip::Gripper {
@@ -71,7 +71,7 @@ public:
     status.was_left_alone = state_->was_left_alone;
     return status;
   }
-  fingertip::GripperStatus move(const fingertip::GripperMove &move) override {
+  fingertip::GripperStatus move(const fingertip::GripCommand &move) override {
     check();
     state_->move(move);
     return poll();

@@ -6,7 +6,6 @@ extern "C" {
 #include "common/contact_flags.h"
 }
 
-#include <algorithm>
 #include <limits>
 
 namespace fingertip {
@@ -39,6 +38,28 @@ constexpr double SLIDES_mm_s = 1.0;
 constexpr std::uint32_t OVER = CONTACT_FLAG_SATURATED | CONTACT_FLAG_FORCE_LOWER_BOUND;
 // Half of the pad, with its rubber beyond the outer sensors.
 constexpr double PAD_x_mm = 18.0, PAD_y_mm = 27.0;
+
+GripTouch touch_from_packet(const wire_packet &packet, double host_us) {
+  const wire_contact &contact = packet.body.contact;
+  const std::uint32_t flags = contact.flags;
+  const auto under = [flags](contact_flag flag, float value) {
+    return (flags & flag) != 0 && std::isfinite(value) ? static_cast<double>(value) : 0.0;
+  };
+  GripTouch touch;
+  touch.t_s = 1e-6 * std::max(host_us, 0.0);
+  touch.flags = flags;
+  touch.force_N = under(CONTACT_FLAG_FIT_VALID, contact.force_N);
+  touch.x_mm = under(CONTACT_FLAG_FIT_VALID, contact.x_mm);
+  touch.y_mm = under(CONTACT_FLAG_FIT_VALID, contact.y_mm);
+  touch.force_sd_N = under(CONTACT_FLAG_UNCERTAINTY_VALID, contact.force_sd_N);
+  touch.sigma_mm = under(CONTACT_FLAG_FIT_VALID, contact.sigma_mm);
+  touch.qx_N = under(CONTACT_FLAG_TANGENTIAL_VALID, contact.qx_N);
+  touch.qy_N = under(CONTACT_FLAG_TANGENTIAL_VALID, contact.qy_N);
+  touch.q_sd_N = under(CONTACT_FLAG_TANGENTIAL_VALID, contact.q_sd_N);
+  touch.speed_x_mm_s = under(CONTACT_FLAG_VELOCITY_VALID, contact.vx_mm_s);
+  touch.speed_y_mm_s = under(CONTACT_FLAG_VELOCITY_VALID, contact.vy_mm_s);
+  return touch;
+}
 
 // What the pad bears of a Gaussian along one axis: its share of the whole, and its middle.
 struct Borne {

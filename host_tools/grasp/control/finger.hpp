@@ -3,6 +3,7 @@
 
 #include "grasp/control/settings.hpp"
 #include "grasp/fingertip_grip.h"
+#include "libfingertip/wire.hpp"
 
 #include <algorithm>
 #include <array>
@@ -26,6 +27,8 @@ struct GripTouch {
   double qx_N = 0.0, qy_N = 0.0, q_sd_N = 0.0;   // tangential force of the object on the rubber
   double speed_x_mm_s = 0.0, speed_y_mm_s = 0.0; // of the contact on the rubber
 };
+// host_us: when the frame was measured. What is no number counts as 0.
+GripTouch touch_from_packet(const wire_packet &contact, double host_us);
 
 using GripTrouble = fingertip_grip_trouble;
 constexpr std::uint32_t GRIP_GRIPPER_FAULTS = GRIP_GRIPPER_FAULT | GRIP_GRIPPER_INACTIVE;

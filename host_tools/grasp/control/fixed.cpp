@@ -17,14 +17,13 @@ std::uint32_t GripFixed::step(const GripReadings &readings, const GripSettings &
   const double error_N = settings.set_N - readings.mean_N;
   const double move_N = reach.least_move_N(readings.mean_N);
   const bool mends = error_N > CLOSES * move_N || error_N < -OPENS * move_N;
-  const GripGains &gains = settings.gains;
   double slope_N_s = 0.0, integral_N_s = integral_N_s_;
   if (runs_) {
     const double passed_s = now_s - stepped_s_;
     slope_N_s = (error_N - error_N_) / passed_s;
     integral_N_s += mends ? error_N * passed_s : 0.0;
   }
-  const double change_mm = gains.kp_mm_N * error_N + gains.ki_mm_Ns * integral_N_s + gains.kd_mm_s_N * slope_N_s;
+  const double change_mm = settings.kp_mm_N * error_N + settings.ki_mm_Ns * integral_N_s + settings.kd_mm_s_N * slope_N_s;
   const double off_mm = reach.touch_width_mm() - change_mm - reach.target_mm();
   const double steps = std::round(off_mm / traits.step_mm);
   double next_mm = reach.target_mm() + (mends ? steps * traits.step_mm : 0.0);

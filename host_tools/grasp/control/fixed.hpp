@@ -9,7 +9,6 @@ namespace fingertip {
 
 class GripFixed {
 public:
-  void begin() { *this = GripFixed(); }
   std::uint32_t step(const GripReadings &readings, const GripSettings &settings, const GripperTraits &traits, double now_s,
                      GripReach &reach);
 

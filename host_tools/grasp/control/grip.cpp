@@ -56,8 +56,8 @@ bool Grip::request(GripRequest request) {
     if (state_ != GRIP_IDLE && state_ != GRIP_OPEN && state_ != GRIP_DROPPED && state_ != GRIP_MISSED && state_ != GRIP_STILL) {
       return false;
     }
-    hold_.begin();
-    fixed_.begin();
+    hold_ = {};
+    fixed_ = {};
     for (GripFinger &finger : fingers_) {
       finger.begin_zero();
     }
@@ -217,7 +217,7 @@ std::uint32_t Grip::make_ready() {
       finger.end_zero();
     }
     place_ = {};
-    hold_.begin();
+    hold_ = {};
     enter(GRIP_HOLDING);
   }
   return trouble;
@@ -331,7 +331,7 @@ void Grip::fill(GripCommand &command) const {
 }
 
 GripReport Grip::report() const {
-  GripReport report;
+  GripReport report{};
   const bool failed = state_ == GRIP_FAULT && status_.fault == 0;
   report.state = state_;
   report.trouble = trouble_;

@@ -14,16 +14,9 @@
 
 namespace fingertip {
 
-struct GripCommand : GripperMove {
-  std::uint8_t motion = GRIP_STAY; // fingertip_grip_motion
-};
-
 using GripState = fingertip_grip_state;
 using GripRequest = fingertip_grip_request;
-
-struct GripReport : fingertip_grip_report {
-  GripReport() : fingertip_grip_report() {}
-};
+using GripReport = fingertip_grip_report;
 
 class Grip {
 public:
@@ -38,6 +31,7 @@ public:
 
   // Other settings from the next step on, in any state. False: their mode is another; nothing changes.
   bool change(const GripSettings &settings);
+  const GripSettings &settings() const { return settings_; }
 
   // Computes the command. Call it after every input, and every 10 ms without one.
   GripReport step(double now_s, GripCommand &command);

@@ -70,8 +70,6 @@ void GripLoad::slides_at(double load_N, double speed_mm_s, double passed_s) {
   rate_N_s_ = 0.0;
 }
 
-void GripHold::begin() { *this = GripHold(); }
-
 double GripHold::friction(const GripSettings &settings) const {
   const double known = friction_.value(settings.friction);
   return by_place_ ? std::min(known, PLACE_FRICTION) : known;

@@ -42,7 +42,6 @@ private:
 
 class GripHold {
 public:
-  void begin();
   // The wanted force. coming_N: the grip after the moves under way. dead_s: from a motion of the object to the motion of the gripper.
   double wants(const GripReadings &readings, double coming_N, const GripSettings &settings, double now_s, double dead_s);
   double friction(const GripSettings &settings) const;

@@ -1,7 +1,5 @@
 #include "grasp/control/reach.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
 namespace fingertip {

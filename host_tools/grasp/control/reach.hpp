@@ -22,9 +22,8 @@ public:
   }
   void both_touch(double width_mm) { both_mm_ = width_mm; }
   double both_mm() const { return both_mm_; }
-  // The force at another width, from the force at this one.
+  // The force at another width, from the force at this one; the width for another force.
   double force_at(double to_mm, double force_N, double from_mm) const;
-  // The width for another force.
   double width_for(double wanted_N, double force_N, double from_mm) const;
   // The furthest width that a force at this one justifies: it doubles the indentation.
   double furthest_mm(double from_mm) const;

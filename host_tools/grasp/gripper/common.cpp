@@ -6,7 +6,7 @@
 
 namespace fingertip {
 
-void check_move(const GripperMove &move) {
+void check_move(const GripCommand &move) {
   if (!std::isfinite(move.width_mm) || !std::isfinite(move.speed_mm_s) || !std::isfinite(move.force_N) || move.speed_mm_s < 0 ||
       move.force_N < 0) {
     throw Error(ErrorCode::bad_value, "a move needs numbers, and speed and force are not negative");
@@ -34,32 +34,32 @@ GripperWay complete(GripperWay way, const GripperUsual &usual) {
   return way;
 }
 
-AskedLine::Bytes AskedLine::exchange(const Bytes &question, std::size_t length) {
-  make_sure();
+RequestLine::Bytes RequestLine::exchange(const Bytes &question, std::size_t length) {
+  resynchronise();
   send(question);
   doubtful_ = true; // until it is answered: who answers late answers the next question
-  sure_number_ = 0;
-  Bytes answer = hear(question, length);
+  probe_ = 0;
+  Bytes answer = receive(question, length);
   doubtful_ = false;
   return answer;
 }
 
-void AskedLine::make_sure() {
+void RequestLine::resynchronise() {
   if (!doubtful_) {
     return;
   }
-  const bool again = sure_number_ == 0 || host_now() >= sure_until_;
-  sure_number_ = !again ? sure_number_ : sure_number_ == 1 ? 2 : 1;
-  const auto [question, length] = sure_question(sure_number_);
+  const bool again = probe_ == 0 || host_now() >= probe_until_;
+  probe_ = !again ? probe_ : probe_ == 1 ? 2 : 1;
+  const auto [question, length] = probe(probe_);
   if (again) {
-    sure_until_ = host_now() + SURE_TIMEOUTS * timeout();
+    probe_until_ = host_now() + PROBE_TIMEOUTS * timeout();
     send(question);
   }
-  hear(question, length);
+  receive(question, length);
   doubtful_ = false;
 }
 
-void AskedLine::send(const Bytes &question) {
+void RequestLine::send(const Bytes &question) {
   line_.drop_input();
   asked_us_ = steady_now_us();
   if (!line_.write(question.data(), question.size())) {
@@ -67,7 +67,7 @@ void AskedLine::send(const Bytes &question) {
   }
 }
 
-AskedLine::Bytes AskedLine::hear(const Bytes &question, std::size_t length) {
+RequestLine::Bytes RequestLine::receive(const Bytes &question, std::size_t length) {
   Bytes came, payload;
   std::size_t noise = 0;
   bool other_slave = false, other_answer = false, echo_gone = false;
@@ -91,12 +91,12 @@ AskedLine::Bytes AskedLine::hear(const Bytes &question, std::size_t length) {
     } else if (!echo_gone && std::equal(came.begin(), came.end(), question.begin())) {
       continue;
     }
-    for (Heard heard; (heard = take(question, length, &came, &noise, &payload)) != Heard::nothing;) {
-      if (heard == Heard::fits) {
+    for (Reply reply; (reply = take(question, length, &came, &noise, &payload)) != Reply::none;) {
+      if (reply == Reply::matches) {
         return payload;
       }
-      other_slave = other_slave || heard == Heard::other_slave;
-      other_answer = other_answer || heard == Heard::other_answer;
+      other_slave = other_slave || reply == Reply::other_slave;
+      other_answer = other_answer || reply == Reply::other_answer;
     }
   }
   if (other_slave || other_answer) {
@@ -110,7 +110,7 @@ AskedLine::Bytes AskedLine::hear(const Bytes &question, std::size_t length) {
                                              std::to_string(std::lround(way_.timeout_s * 1000)) + " ms");
 }
 
-std::string AskedLine::limited_by(int exchanges) const {
+std::string RequestLine::limited_by(int exchanges) const {
   const std::optional<int> timer_ms = latency_timer_ms(way_.port);
   if (!timer_ms || *timer_ms <= 1) {
     return "";

@@ -13,7 +13,7 @@
 namespace fingertip {
 
 // Throws Error: bad_value.
-void check_move(const GripperMove &move);
+void check_move(const GripCommand &move);
 
 // way, completed by the model's defaults. Throws Error: bad_value; counts go from 0 to most_count.
 struct GripperUsual {
@@ -26,30 +26,30 @@ GripperWay complete(GripperWay way, const GripperUsual &usual);
 //
 // Answers have no number: a late one would pass for that to the next question. But they come in the order of the questions. So after a
 // question without an answer another is asked, once, whose answer no other has, and what comes before that is not expected. It waits
-// SURE_TIMEOUTS times as long as any other; where its answer is lost the question with the other number is asked, lest the first come after
-// all. An answer that is late by less than that is never taken for another's.
-class AskedLine : public Gripper {
+// PROBE_TIMEOUTS times as long as any other; where its answer is lost the question with the other number is asked, lest the first come
+// after all. An answer that is late by less than that is never taken for another's.
+class RequestLine : public Gripper {
 public:
   using Bytes = std::vector<std::uint8_t>;
-  static constexpr int SURE_TIMEOUTS = 5;
+  static constexpr int PROBE_TIMEOUTS = 5;
 
   // complete: complete() has made it so.
-  AskedLine(const GripperWay &complete, unsigned baud, const GripperTraits &traits)
+  RequestLine(const GripperWay &complete, unsigned baud, const GripperTraits &traits)
       : way_(complete), line_(complete.port, baud), traits_(traits) {}
   const GripperTraits &traits() const override { return traits_; }
 
 protected:
-  enum class Heard { nothing, other_slave, other_answer, fits };
+  enum class Reply { none, other_slave, other_answer, matches };
   // Takes the first whole frame out of what came. The payload of one that fits a question; noise counts bytes of no
   // frame. Throws Error: gripper_refused.
-  virtual Heard take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) = 0;
+  virtual Reply take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) = 0;
   // That question, 1 or 2, and the length of its answer's payload.
-  virtual std::pair<Bytes, std::size_t> sure_question(int number) const = 0;
+  virtual std::pair<Bytes, std::size_t> probe(int number) const = 0;
 
   // question: the whole frame. Returns the answer's payload, which has this length. Throws Error: gone,
   // gripper_silent, gripper_garbled, gripper_refused.
   Bytes exchange(const Bytes &question, std::size_t length);
-  void make_sure(); // before every exchange
+  void resynchronise(); // before every exchange
   void doubt() { doubtful_ = true; }
 
   // "; the USB adapter's latency timer ..." where that limits the rate of a command of this number of exchanges; "" where it does not.
@@ -63,12 +63,12 @@ protected:
 
 private:
   void send(const Bytes &question);
-  Bytes hear(const Bytes &question, std::size_t length);
+  Bytes receive(const Bytes &question, std::size_t length);
   std::chrono::microseconds timeout() const { return std::chrono::microseconds(static_cast<std::int64_t>(way_.timeout_s * 1e6)); }
 
-  bool doubtful_ = false; // an answer may still come that is not expected
-  int sure_number_ = 0;   // which sure question has been asked, 0: none,
-  HostTime sure_until_{}; // and is still waited for
+  bool doubtful_ = false;  // an answer may still come that is not expected
+  int probe_ = 0;          // which probe has been asked, 0: none,
+  HostTime probe_until_{}; // and is still waited for
 };
 
 } // namespace fingertip

@@ -3,8 +3,6 @@
 #include "libfingertip/clock.hpp"
 #include "libfingertip/text.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <numeric>
 
 namespace fingertip {
@@ -93,7 +91,7 @@ GripperWay feetech_way(const GripperWay &way) {
 }
 
 FeetechGripper::FeetechGripper(const GripperWay &given)
-    : AskedLine(feetech_way(given), BAUD, feetech_traits(given.model, feetech_way(given))), jaw_(way_) {
+    : RequestLine(feetech_way(given), BAUD, feetech_traits(given.model, feetech_way(given))), jaw_(way_) {
   const Bytes table = read(MODEL, OPERATING_MODE + 1 - MODEL);
   servo_model_ = word(table, 0);
   const int mode = table[OPERATING_MODE - MODEL];
@@ -104,17 +102,17 @@ FeetechGripper::FeetechGripper(const GripperWay &given)
   poll();
 }
 
-AskedLine::Heard FeetechGripper::take(const Bytes &, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) {
+RequestLine::Reply FeetechGripper::take(const Bytes &, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) {
   const std::optional<Packet> answer = take_packet(came, noise);
   if (!answer) {
-    return Heard::nothing;
+    return Reply::none;
   }
   *payload = answer->parameters;
-  return answer->id != way_.slave ? Heard::other_slave : payload->size() != length ? Heard::other_answer : Heard::fits;
+  return answer->id != way_.slave ? Reply::other_slave : payload->size() != length ? Reply::other_answer : Reply::matches;
 }
 
 // Two or three bytes: no other answer has so few.
-std::pair<AskedLine::Bytes, std::size_t> FeetechGripper::sure_question(int number) const {
+std::pair<RequestLine::Bytes, std::size_t> FeetechGripper::probe(int number) const {
   return {question_of(READ, {MODEL, static_cast<std::uint8_t>(number + 1)}), static_cast<std::size_t>(number + 1)};
 }
 
@@ -171,7 +169,7 @@ void FeetechGripper::activate() {
   write(TORQUE_ENABLE, {1});
 }
 
-GripperStatus FeetechGripper::move(const GripperMove &move) {
+GripperStatus FeetechGripper::move(const GripCommand &move) {
   check_move(move);
   if (!active_ && !poll().active) {
     return poll();

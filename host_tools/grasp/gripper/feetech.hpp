@@ -22,11 +22,9 @@ namespace fingertip::feetech {
 
 constexpr int BAUD = 1'000'000;
 constexpr int SLAVE = 6, MOST_SLAVE = 253; // the gripper of an SO-101
-constexpr std::uint8_t BROADCAST = 254;
 constexpr double COUNTS_PER_TURN = 4096.0;
 
-// REG_WRITE is done on ACTION.
-enum Instruction : std::uint8_t { PING = 1, READ = 2, WRITE = 3, REG_WRITE = 4, ACTION = 5, SYNC_READ = 0x82, SYNC_WRITE = 0x83 };
+enum Instruction : std::uint8_t { PING = 1, READ = 2, WRITE = 3 };
 
 enum Address : std::uint8_t {
   MODEL = 3, // 2 bytes
@@ -104,7 +102,7 @@ GripperTraits feetech_traits(const std::string &model, const GripperWay &complet
 // Completed by the defaults. Throws Error: bad_value.
 GripperWay feetech_way(const GripperWay &way);
 
-class FeetechGripper final : public AskedLine {
+class FeetechGripper final : public RequestLine {
 public:
   explicit FeetechGripper(const GripperWay &given);
 
@@ -112,13 +110,13 @@ public:
   // Torque on, at the position where it is.
   void activate() override;
   GripperStatus poll() override;
-  GripperStatus move(const GripperMove &move) override;
+  GripperStatus move(const GripCommand &move) override;
   // Several bits may be set.
   std::string fault_text(std::uint8_t fault) const override;
 
 private:
-  Heard take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) override;
-  std::pair<Bytes, std::size_t> sure_question(int number) const override;
+  Reply take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) override;
+  std::pair<Bytes, std::size_t> probe(int number) const override;
   Bytes question_of(std::uint8_t instruction, const Bytes &parameters) const {
     return feetech::encoded({static_cast<std::uint8_t>(way_.slave), instruction, parameters});
   }

@@ -48,10 +48,10 @@ struct GripperStatus {
   double t_s() const { return 1e-6 * static_cast<double>(host_us); }
 };
 
-struct GripperMove {
-  double width_mm = 0.0;   // beyond its ends: to that end
-  double speed_mm_s = 0.0; // beyond its limits: the nearest it can
-  double force_N = 0.0;    // its own limit; 0: its least
+struct GripCommand {
+  double width_mm = 0.0, speed_mm_s = 0.0; // beyond its ends and limits: as far as it can
+  double force_N = 0.0;                    // its own limit; 0: its least
+  std::uint32_t motion = GRIP_STAY;        // fingertip_grip_motion
 };
 
 class Gripper {
@@ -66,7 +66,7 @@ public:
   virtual GripperStatus poll() = 0;
   // Sends and polls in one exchange where the line can do that, else in two. A gripper that is not
   // active ignores it, as the status shows. Also throws Error: bad_value, of what is no number.
-  virtual GripperStatus move(const GripperMove &move) = 0;
+  virtual GripperStatus move(const GripCommand &move) = 0;
   // What a fault code of poll means; "" for 0.
   virtual std::string fault_text(std::uint8_t fault) const = 0;
 };
@@ -83,7 +83,7 @@ struct GripperWay {
 };
 
 // Each with its usual counts and jaw. The first is the default of programs.
-std::vector<GripperTraits> gripper_models();
+const std::vector<GripperTraits> &gripper_models();
 // "2f85, 2f140, ...", for people.
 std::string gripper_model_names();
 // Throws Error: bad_value, an unknown model.

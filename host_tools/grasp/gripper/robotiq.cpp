@@ -73,7 +73,7 @@ double robotiq::step_mm(const GripperWay &complete, const GripperTraits &traits)
   return traits.stroke_mm / (*complete.closed_count - *complete.open_count);
 }
 
-Request robotiq::request_of(const GripperMove &move, const GripperWay &complete, const GripperTraits &traits) {
+Request robotiq::request_of(const GripCommand &move, const GripperWay &complete, const GripperTraits &traits) {
   check_move(move);
   // At an end all that there is: its count differs from one gripper to the next.
   const int count = move.width_mm <= 0 ? 255
@@ -102,7 +102,7 @@ GripperStatus robotiq::status_of(const Answer &answer, std::int64_t asked_us, co
   return status;
 }
 
-RobotiqGripper::RobotiqGripper(const GripperWay &given) : AskedLine(complete_way(given), BAUD, gripper_traits(given.model)) {
+RobotiqGripper::RobotiqGripper(const GripperWay &given) : RequestLine(complete_way(given), BAUD, gripper_traits(given.model)) {
   traits_.step_mm = step_mm(way_, traits_);
   std::optional<Error> garbled;
   for (const int function : {4, 3}) {
@@ -121,7 +121,7 @@ RobotiqGripper::RobotiqGripper(const GripperWay &given) : AskedLine(complete_way
   }
 }
 
-AskedLine::Heard RobotiqGripper::take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) {
+RequestLine::Reply RobotiqGripper::take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) {
   for (; came->size() > HEAD; came->erase(came->begin()), ++*noise) {
     const std::uint8_t function = (*came)[1];
     const bool known = function == 3 || function == 4 || function == WRITE_AND_READ;
@@ -138,32 +138,32 @@ AskedLine::Heard RobotiqGripper::take(const Bytes &question, std::size_t length,
     }
     came->erase(came->begin(), came->begin() + static_cast<std::ptrdiff_t>(size));
     if (frame[0] != question[0]) {
-      return Heard::other_slave;
+      return Reply::other_slave;
     }
     if (function == (question[1] | EXCEPTION)) {
       throw Error(ErrorCode::gripper_refused, way_.port + ": refused with Modbus exception " + std::to_string(frame[HEAD]));
     }
     if (function != question[1] || size != HEAD + length + CRC) {
-      return Heard::other_answer;
+      return Reply::other_answer;
     }
     payload->assign(frame.begin() + HEAD, frame.end() - CRC);
-    return Heard::fits;
+    return Reply::matches;
   }
-  return Heard::nothing;
+  return Reply::none;
 }
 
 // One or two registers, where a status has three.
-std::pair<AskedLine::Bytes, std::size_t> RobotiqGripper::sure_question(int number) const {
+std::pair<RequestLine::Bytes, std::size_t> RobotiqGripper::probe(int number) const {
   return {read_question(number), answer_length(number)};
 }
 
-AskedLine::Bytes RobotiqGripper::question_of(int function, const Bytes &rest) const {
+RequestLine::Bytes RobotiqGripper::question_of(int function, const Bytes &rest) const {
   Bytes question = {static_cast<std::uint8_t>(way_.slave), static_cast<std::uint8_t>(function)};
   question.insert(question.end(), rest.begin(), rest.end());
   return with_crc(question);
 }
 
-AskedLine::Bytes RobotiqGripper::read_question(int count) const {
+RequestLine::Bytes RobotiqGripper::read_question(int count) const {
   Bytes rest;
   put_words(&rest, {STATUS_REGISTER, count});
   return question_of(read_function_, rest);
@@ -213,7 +213,7 @@ void RobotiqGripper::activate() {
   goes_ = active_ = false;
 }
 
-GripperStatus RobotiqGripper::move(const GripperMove &move) {
+GripperStatus RobotiqGripper::move(const GripCommand &move) {
   const Request request = request_of(move, way_, traits_);
   const Registers command = {rACT | rGTO, static_cast<std::uint16_t>(request.position),
                              static_cast<std::uint16_t>(request.speed << 8 | request.force)};
@@ -242,7 +242,7 @@ GripperStatus RobotiqGripper::move(const GripperMove &move) {
       }
       both_failed_++;
     }
-    make_sure(); // it is there, but does not answer this
+    resynchronise(); // it is there, but does not answer this
     both_at_once_ = both_failed_ < BOTH_TRIES;
   }
   write(command, 1);

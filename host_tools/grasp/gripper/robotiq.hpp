@@ -56,7 +56,7 @@ double step_mm(const GripperWay &complete, const GripperTraits &traits);
 struct Request {
   int position, speed, force; // rPR, rSP, rFR
 };
-Request request_of(const GripperMove &move, const GripperWay &complete, const GripperTraits &traits); // Throws Error: bad_value
+Request request_of(const GripCommand &move, const GripperWay &complete, const GripperTraits &traits); // Throws Error: bad_value
 struct Answer {
   bool active, goes;
   int gsta, gobj, gpo, gflt;
@@ -68,21 +68,21 @@ std::string fault_text(std::uint8_t fault);
 
 namespace fingertip {
 
-class RobotiqGripper final : public AskedLine {
+class RobotiqGripper final : public RequestLine {
 public:
   explicit RobotiqGripper(const GripperWay &given);
 
   std::string line() const override;
   void activate() override;
   GripperStatus poll() override { return status_of(registers_of(read_question(robotiq::REGISTERS), robotiq::REGISTERS)); }
-  GripperStatus move(const GripperMove &move) override;
+  GripperStatus move(const GripCommand &move) override;
   std::string fault_text(std::uint8_t fault) const override { return robotiq::fault_text(fault); }
 
 private:
   using Registers = std::array<std::uint16_t, robotiq::REGISTERS>;
 
-  Heard take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) override;
-  std::pair<Bytes, std::size_t> sure_question(int number) const override;
+  Reply take(const Bytes &question, std::size_t length, Bytes *came, std::size_t *noise, Bytes *payload) override;
+  std::pair<Bytes, std::size_t> probe(int number) const override;
   // rest: what follows the function.
   Bytes question_of(int function, const Bytes &rest) const;
   Bytes read_question(int count) const;

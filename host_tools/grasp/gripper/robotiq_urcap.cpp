@@ -145,7 +145,7 @@ GripperStatus RobotiqUrcap::poll() {
   return status;
 }
 
-GripperStatus RobotiqUrcap::move(const GripperMove &move) {
+GripperStatus RobotiqUrcap::move(const GripCommand &move) {
   const Request request = request_of(move, way_, traits_);
   if (!active_) {
     const GripperStatus now = poll();

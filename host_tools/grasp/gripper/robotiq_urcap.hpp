@@ -30,7 +30,7 @@ public:
   void activate() override;      // waits half a second after the reset
   GripperStatus poll() override; // six exchanges
   // Seven exchanges; of a gripper that was not active thirteen.
-  GripperStatus move(const GripperMove &move) override;
+  GripperStatus move(const GripCommand &move) override;
   std::string fault_text(std::uint8_t fault) const override { return robotiq::fault_text(fault); }
 
 private:

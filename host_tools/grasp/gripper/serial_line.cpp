@@ -5,8 +5,6 @@
 #include "libfingertip/text.hpp"
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <termios.h>
@@ -15,24 +13,12 @@ namespace fingertip {
 
 namespace fs = std::filesystem;
 
-static speed_t speed_of(unsigned baud) {
-  return baud == 115200 ? B115200 : baud == 1000000 ? B1000000 : throw std::logic_error("no such speed");
-}
-
-static std::string line_of(const fs::path &path) {
-  std::ifstream file(path);
-  std::string text;
-  std::getline(file, text);
-  return std::string(trim(text));
-}
-
 SerialLine::SerialLine(const std::string &path, unsigned baud) : SerialTransport(path) {
   termios settings;
   struct stat status;
   const bool is_simulated = fstat(fd_, &status) == 0 && S_ISSOCK(status.st_mode);
-  if (is_simulated) {
-    speed_of(baud); // which a socket does not have
-  } else if (tcgetattr(fd_, &settings) != 0 || cfsetspeed(&settings, speed_of(baud)) != 0 || tcsetattr(fd_, TCSANOW, &settings) != 0) {
+  const speed_t speed = baud == 1000000 ? B1000000 : B115200;
+  if (!is_simulated && (tcgetattr(fd_, &settings) != 0 || cfsetspeed(&settings, speed) != 0 || tcsetattr(fd_, TCSANOW, &settings) != 0)) {
     throw Error(ErrorCode::cannot_open, path + ": cannot go at " + std::to_string(baud) + " baud");
   }
   drop_input();
@@ -49,7 +35,7 @@ void SerialLine::drop_input() {
 std::optional<int> latency_timer_ms(const std::string &port, const std::string &root) {
   std::error_code none;
   const fs::path device = fs::canonical(port, none);
-  const auto timer_ms = to_i64(line_of(fs::path(root) / "sys/bus/usb-serial/devices" / device.filename() / "latency_timer"));
+  const auto timer_ms = to_i64(first_line(fs::path(root) / "sys/bus/usb-serial/devices" / device.filename() / "latency_timer"));
   return none || !timer_ms ? std::nullopt : std::optional(static_cast<int>(*timer_ms));
 }
 
@@ -76,7 +62,7 @@ std::vector<GripperPort> find_gripper_ports(const std::string &root) {
     // Up from the tty to the USB device, which has the names.
     for (fs::path usb = interface; usb.has_relative_path(); usb = usb.parent_path()) {
       if (fs::exists(usb / "idVendor", none)) {
-        port.adapter = std::string(trim(line_of(usb / "manufacturer") + " " + line_of(usb / "product")));
+        port.adapter = std::string(trim(first_line(usb / "manufacturer") + " " + first_line(usb / "product")));
         break;
       }
     }

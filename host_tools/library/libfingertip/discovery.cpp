@@ -5,21 +5,20 @@
 #include <algorithm>
 #include <charconv>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 
 namespace fingertip {
 
-namespace {
-
 namespace fs = std::filesystem;
 
-std::string file_text(const fs::path &path) {
+std::string first_line(const std::filesystem::path &path) {
   std::ifstream file(path);
   std::string text;
   std::getline(file, text);
   return std::string(trim(text));
 }
+
+namespace {
 
 bool is_hex(const std::string &text, unsigned expected) {
   unsigned value = 0;
@@ -59,7 +58,7 @@ constexpr BootRom BOOT_ROMS[] = {
 };
 
 bool is_device(const fs::path &usb, unsigned vendor, unsigned product) {
-  return is_hex(file_text(usb / "idVendor"), vendor) && is_hex(file_text(usb / "idProduct"), product);
+  return is_hex(first_line(usb / "idVendor"), vendor) && is_hex(first_line(usb / "idProduct"), product);
 }
 
 } // namespace
@@ -83,9 +82,9 @@ std::vector<Found> find_usb(const std::string &root) {
     if (!is_device(usb, FINGERTIP_USB_VID, FINGERTIP_USB_PID)) {
       continue;
     }
-    auto number = [&](const char *name) { return static_cast<unsigned>(to_u64(file_text(usb / name)).value_or(0)); };
+    auto number = [&](const char *name) { return static_cast<unsigned>(to_u64(first_line(usb / name)).value_or(0)); };
     found.push_back(
-        {file_text(usb / "serial"), file_text(usb / "product"), port_of(usb, root), UsbPlace{number("busnum"), number("devnum")}});
+        {first_line(usb / "serial"), first_line(usb / "product"), port_of(usb, root), UsbPlace{number("busnum"), number("devnum")}});
   }
   std::sort(found.begin(), found.end(), [](const Found &a, const Found &b) { return a.serial < b.serial; });
   return found;

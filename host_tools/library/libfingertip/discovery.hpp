@@ -1,6 +1,7 @@
 /* Finds fingertips in the list of USB devices of Linux, and in the environment. Nothing is opened. */
 #pragma once
 
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,9 @@ std::string find_boot_rom(const std::string &root = "/");
 
 /* The paths in the environment variable FINGERTIP_PORT, separated by colons. */
 std::vector<Found> find_in_environment();
+
+/* Trimmed; empty where there is none. */
+std::string first_line(const std::filesystem::path &path);
 
 /* The stable name of a device below /dev, or the path itself. */
 std::string stable_port(const std::string &path, const std::string &root = "/");

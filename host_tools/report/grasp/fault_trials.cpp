@@ -21,11 +21,11 @@ constexpr std::uint64_t SEED = 1001;
 // More than the same grasp opens without the fault: a first grip comes down to what the load needs, of the cup by 1.5 mm.
 constexpr double OPENS_mm = 1.0;
 
-struct Thing {
+struct TestObject {
   const char *name;
   double mass_kg, friction, at_1_mm_N, exponent, crushes_N, cap_N;
 };
-constexpr Thing THINGS[] = {{"paper cup", 0.05, 0.6, 2.5, 1.3, 5.0, 4.0}, {"ball", 0.25, 0.5, 3.0, 1.6, UNLIMITED, 10.0}};
+constexpr TestObject TEST_OBJECTS[] = {{"paper cup", 0.05, 0.6, 2.5, 1.3, 5.0, 4.0}, {"ball", 0.25, 0.5, 3.0, 1.6, UNLIMITED, 10.0}};
 
 enum Fingers { NONE = 0, LEFT = 1, BOTH = 3 };
 constexpr std::uint32_t LEFT_STALE = GRIP_FINGER_0_STALE, STALE = GRIP_FINGER_0_STALE | GRIP_FINGER_1_STALE;
@@ -33,14 +33,14 @@ constexpr std::uint32_t FROZEN = GRIP_FINGER_0_FROZEN | GRIP_FINGER_1_FROZEN;
 constexpr std::uint32_t FORCE_ONLY = GRIP_FINGER_0_FORCE_ONLY | GRIP_FINGER_1_FORCE_ONLY;
 constexpr std::uint32_t OVER = GRIP_FINGER_0_OVER | GRIP_FINGER_1_OVER;
 
-struct Happening {
+struct FaultCase {
   const char *name;
   FaultKind kind;
   Fingers fingers = NONE;
   std::uint32_t all_of = 0;
   double lasts_s = UNLIMITED;
 };
-constexpr Happening HAPPENINGS[] = {
+constexpr FaultCase FAULT_CASES[] = {
     {"nothing", FaultKind::none},
     {"one fingertip gone", FaultKind::gone, LEFT, LEFT_STALE},
     {"both fingertips gone", FaultKind::gone, BOTH, STALE},
@@ -63,77 +63,78 @@ constexpr Happening HAPPENINGS[] = {
     {"object gone", FaultKind::taken},
 };
 
-struct When {
+struct StateCase {
   const char *name;
   std::uint8_t state;
   double after_s, watched_s;
   std::optional<GripRequest> asked = {};
 };
-constexpr When STATES[] = {{"activate", GRIP_ACTIVATING, 0.3, 7.0},
-                           {"approach", GRIP_APPROACH, 0.05, 3.0},
-                           {"squeeze", GRIP_SQUEEZE, 0.02, 2.5},
-                           {"ready", GRIP_READY, 0.02, 2.5},
-                           {"holding", GRIP_HOLDING, 0.8, 2.0},
-                           {"slipping", GRIP_SLIPPING, 0.0, 2.0},
-                           {"still", GRIP_STILL, 0.05, 2.0, GRIP_REQUEST_HOLD},
-                           {"placing", GRIP_PLACING, 0.05, 2.0, GRIP_REQUEST_PLACE},
-                           {"handing", GRIP_HANDING, 0.05, 2.0, GRIP_REQUEST_HAND_OVER},
-                           {"release", GRIP_RELEASE, 0.02, 2.0, GRIP_REQUEST_RELEASE}};
+constexpr StateCase STATES[] = {{"activate", GRIP_ACTIVATING, 0.3, 7.0},
+                                {"approach", GRIP_APPROACH, 0.05, 3.0},
+                                {"squeeze", GRIP_SQUEEZE, 0.02, 2.5},
+                                {"ready", GRIP_READY, 0.02, 2.5},
+                                {"holding", GRIP_HOLDING, 0.8, 2.0},
+                                {"slipping", GRIP_SLIPPING, 0.0, 2.0},
+                                {"still", GRIP_STILL, 0.05, 2.0, GRIP_REQUEST_HOLD},
+                                {"placing", GRIP_PLACING, 0.05, 2.0, GRIP_REQUEST_PLACE},
+                                {"handing", GRIP_HANDING, 0.05, 2.0, GRIP_REQUEST_HAND_OVER},
+                                {"release", GRIP_RELEASE, 0.02, 2.0, GRIP_REQUEST_RELEASE}};
 
 struct FaultTrial {
-  const Thing &thing;
-  const When &when;
-  const Happening &happening;
-  KindTrial trial;
+  const TestObject &object;
+  const StateCase &state_case;
+  const FaultCase &fault_case;
+  GraspTrial trial;
   // What must be reported, of GripTrouble: each of these, one of those; and where it must end.
   std::uint32_t all_of = 0, any_of = 0;
   std::vector<std::uint8_t> ends_in = {}; // empty: anywhere
   bool is_untold = false;
 };
 
-KindTrial trial_of(const Thing &thing, const std::string &gripper, const When &when, const Happening &happening, std::uint64_t n) {
-  KindTrial trial;
+GraspTrial trial_of(const TestObject &object, const std::string &gripper, const StateCase &state_case, const FaultCase &fault_case,
+                    std::uint64_t n) {
+  GraspTrial trial;
   trial.gripper = gripper_mechanics(gripper);
   trial.seed = SEED + n;
-  KindOfGrasp &grasp = trial.grasp;
-  grasp.mass_kg = thing.mass_kg;
-  grasp.exponent = thing.exponent;
-  grasp.crushes_N = thing.crushes_N;
-  for (KindOfPad &pad : grasp.pads) {
-    pad.friction = thing.friction;
-    pad.at_1_mm_N = thing.at_1_mm_N;
+  GraspScenario &grasp = trial.grasp;
+  grasp.mass_kg = object.mass_kg;
+  grasp.exponent = object.exponent;
+  grasp.crushes_N = object.crushes_N;
+  for (PadProperties &pad : grasp.pads) {
+    pad.friction = object.friction;
+    pad.at_1_mm_N = object.at_1_mm_N;
   }
   grasp.pads[0].gain = 0.95;
   grasp.opens_mm = 2.0;
   grasp.lift_mm = 5.0;
   grasp.lift_s = 0.3;
   grasp.ends_s = 60.0;
-  trial.activates = when.state == GRIP_ACTIVATING;
+  trial.activates = state_case.state == GRIP_ACTIVATING;
   grasp.width_mm = trial.activates ? trial.gripper.traits.stroke_mm - grasp.opens_mm : grasp.width_mm;
-  trial.slick_after_s = when.state == GRIP_SLIPPING ? std::optional(0.6) : std::nullopt;
-  trial.asked = when.asked;
+  trial.slick_after_s = state_case.state == GRIP_SLIPPING ? std::optional(0.6) : std::nullopt;
+  trial.asked = state_case.asked;
   trial.asked_after_s = 0.8;
   Fault fault;
-  fault.kind = happening.kind;
-  fault.fingers = {(happening.fingers & 1) != 0, (happening.fingers & 2) != 0};
-  fault.state = when.state;
+  fault.kind = fault_case.kind;
+  fault.fingers = {(fault_case.fingers & 1) != 0, (fault_case.fingers & 2) != 0};
+  fault.state = state_case.state;
   // A servo is active at once.
-  fault.after_s = trial.activates && trial.gripper.activation_s == 0.0 ? 0.0 : when.after_s;
-  fault.lasts_s = happening.lasts_s;
-  fault.watched_s = when.watched_s;
-  fault.is_followed_by_pouring = when.state != GRIP_HANDING; // which pulls
+  fault.after_s = trial.activates && trial.gripper.activation_s == 0.0 ? 0.0 : state_case.after_s;
+  fault.lasts_s = fault_case.lasts_s;
+  fault.watched_s = state_case.watched_s;
+  fault.is_followed_by_pouring = state_case.state != GRIP_HANDING; // which pulls
   trial.fault = fault;
   return trial;
 }
 
 // What must be reported, where that depends on the state.
 void expect(FaultTrial &one) {
-  const std::uint8_t state = one.when.state;
-  const FaultKind kind = one.happening.kind;
+  const std::uint8_t state = one.state_case.state;
+  const FaultKind kind = one.fault_case.kind;
   const bool untouched = state == GRIP_ACTIVATING || state == GRIP_APPROACH, squeezes = state == GRIP_SQUEEZE;
-  one.all_of = one.happening.all_of;
+  one.all_of = one.fault_case.all_of;
   if (kind == FaultKind::frozen && untouched) {
-    one.is_untold = one.happening.fingers == BOTH;
+    one.is_untold = one.fault_case.fingers == BOTH;
     one.all_of = 0;
     one.any_of = one.is_untold ? 0 : GRIP_FINGER_0_FROZEN | GRIP_FINGERS_DIFFER;
   } else if (kind == FaultKind::nothing && (untouched || state == GRIP_RELEASE)) {
@@ -156,30 +157,30 @@ void expect(FaultTrial &one) {
   }
 }
 
-KindOutcome outcome_of(const Face &face, const FaultTrial &one, const KindTrial &trial) {
+TrialOutcome outcome_of(const Face &face, const FaultTrial &one, const GraspTrial &trial) {
   const GripperTraits &traits = trial.gripper.traits;
-  CoreController controller(settings_for(traits, {{"cap", one.thing.cap_N}}), traits);
-  return run_kind(trial, face, controller);
+  CoreController controller(settings_for(traits, {{"cap", one.object.cap_N}}), traits);
+  return run_trial(trial, face, controller);
 }
 
 // The same without the fault, which decides how far it may open.
 double may_open_mm(const Face &face, const FaultTrial &one) {
-  KindTrial sound = one.trial;
+  GraspTrial sound = one.trial;
   sound.fault->lasts_s = 0.0;
   return outcome_of(face, one, sound).failed.opened_mm + OPENS_mm;
 }
 
 nlohmann::ordered_json row_of(const Face &face, const FaultTrial &one, double may_open_mm) {
-  const double cap_N = one.thing.cap_N;
-  const KindOutcome outcome = outcome_of(face, one, one.trial);
-  const Failed &failed = outcome.failed;
+  const double cap_N = one.object.cap_N;
+  const TrialOutcome outcome = outcome_of(face, one, one.trial);
+  const FaultOutcome &failed = outcome.failed;
   const bool ends = one.ends_in.empty() || std::find(one.ends_in.begin(), one.ends_in.end(), failed.state) != one.ends_in.end();
   const bool reports = (failed.trouble & one.all_of) == one.all_of && (one.any_of == 0 || (failed.trouble & one.any_of) != 0) &&
-                       failed.gripper_fault == (one.happening.kind == FaultKind::fault ? 9 : 0);
-  return {{"fault", one.happening.name},
-          {"state", one.when.name},
+                       failed.gripper_fault == (one.fault_case.kind == FaultKind::fault ? 9 : 0);
+  return {{"fault", one.fault_case.name},
+          {"state", one.state_case.name},
           {"gripper", one.trial.gripper.traits.model},
-          {"object", one.thing.name},
+          {"object", one.object.name},
           {"begun", failed.begun},
           {"untold", one.is_untold},
           {"reported", trouble_names(failed.trouble)},
@@ -188,7 +189,7 @@ nlohmann::ordered_json row_of(const Face &face, const FaultTrial &one, double ma
           {"peak_N", outcome.peak_N},
           {"cap_N", cap_N},
           {"crushed", outcome.crushed},
-          {"opened", one.when.state != GRIP_RELEASE && failed.opened_mm > may_open_mm},
+          {"opened", one.state_case.state != GRIP_RELEASE && failed.opened_mm > may_open_mm},
           {"beyond_cap", outcome.peak_N > cap_N},
           {"unsaid", !ends || !reports}};
 }
@@ -203,11 +204,11 @@ nlohmann::ordered_json fault_rows(const Face &face, std::uint64_t jobs) {
     models.emplace(traits.driver, traits.model);
   }
   for (const auto &[driver, gripper] : models) {
-    for (const Thing &thing : THINGS) {
-      for (const When &when : STATES) {
+    for (const TestObject &object : TEST_OBJECTS) {
+      for (const StateCase &state_case : STATES) {
         grasps++;
-        for (const Happening &happening : HAPPENINGS) {
-          all.push_back({thing, when, happening, trial_of(thing, gripper, when, happening, grasps)});
+        for (const FaultCase &fault_case : FAULT_CASES) {
+          all.push_back({object, state_case, fault_case, trial_of(object, gripper, state_case, fault_case, grasps)});
           expect(all.back());
         }
       }
@@ -215,10 +216,10 @@ nlohmann::ordered_json fault_rows(const Face &face, std::uint64_t jobs) {
   }
   std::vector<double> may_open(grasps);
   twin::in_parallel(
-      grasps, [&](std::size_t i) { may_open[i] = may_open_mm(face, all[i * std::size(HAPPENINGS)]); }, jobs);
+      grasps, [&](std::size_t i) { may_open[i] = may_open_mm(face, all[i * std::size(FAULT_CASES)]); }, jobs);
   std::vector<nlohmann::ordered_json> rows(all.size());
   twin::in_parallel(
-      all.size(), [&](std::size_t i) { rows[i] = row_of(face, all[i], may_open[i / std::size(HAPPENINGS)]); }, jobs);
+      all.size(), [&](std::size_t i) { rows[i] = row_of(face, all[i], may_open[i / std::size(FAULT_CASES)]); }, jobs);
   return rows;
 }
 

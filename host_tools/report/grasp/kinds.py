@@ -169,10 +169,7 @@ JUDGED = {
     "friction_below_0.6_of_true_percent": (5, worst("friction_below_0.6_of_true_percent", "usual and rough")),
     "limit_cycles": (0, lambda ours, sets, wrong: sum(row["limit_cycles"] for row in sets if row["row"] != "12 s")),
     "one_bad_frame_squeezed": (0, lambda ours, sets, wrong: sum(row["squeezed"] for row in wrong if row["then"] in WRONG_SHORT)),
-    "lasting_bad_squeezed_percent": (
-        2,
-        lambda ours, sets, wrong: max((row["squeezed_percent"] or 0 for row in wrong if row["then"] in WRONG), default=None),
-    ),
+    "lasting_bad_squeezed_percent": (2, lambda _, __, wrong: max(row["squeezed_percent"] or 0 for row in wrong if row["then"] in WRONG)),
 }
 LIMITS = {f"{name}_{called}": limit for name, (limits, _) in BY_GRIPPER.items() for called, limit in zip(CALLED.values(), limits)}
 LIMITS |= {f"margin_median_{shape}": limit for shape, (_, limit) in BY_SHAPE.items()} | {name: limit for name, (limit, _) in JUDGED.items()}
@@ -199,13 +196,13 @@ def figures(rows, sets, shapes, wrong):
 
 def measure(options, steps):
     judged, more = (options.grasps, options.grasps) if options.grasps else (USUAL, USUAL_MORE) if options.usual else (GRASPS, GRASPS_MORE)
+    grasps = lambda *call: found_by(options.build, *call, "--seed", options.seed)["each"]
     found = {"kinds": [], "shapes": [], "sets": [], "distributions": []}
     for name, (arguments, is_judged) in ROWS.items():
         for gripper in GRIPPERS:
             for controller in CONTROLLERS if is_judged else ("ours",):
                 count = judged if controller == "ours" and is_judged else more
-                call = (*arguments, "--gripper", gripper, "--controller", controller, "--seed", options.seed)
-                each = found_by(options.build, *call, "--count", count)["each"]
+                each = grasps(*arguments, "--gripper", gripper, "--controller", controller, "--count", count)
                 found["kinds"].append({"row": name, "gripper": gripper, "controller": controller, **summary(each)})
                 if name == "usual and rough" and controller == "ours":
                     found["shapes"] += shape_rows(gripper, each)
@@ -222,15 +219,15 @@ def measure(options, steps):
     for name, (arguments, controller) in SETS.items():
         for gripper in GRIPPERS:
             count = max(1, more // 5) if name == "60 s" else more
-            call = (*arguments, "--gripper", gripper, "--controller", controller, "--seed", options.seed, "--count", count)
-            found["sets"].append({"row": name, "gripper": gripper, **summary_of_sets(found_by(options.build, *call)["each"])})
+            each = grasps(*arguments, "--gripper", gripper, "--controller", controller, "--count", count)
+            found["sets"].append({"row": name, "gripper": gripper, **summary_of_sets(each)})
             steps.report(f"{gripper}, a set force for {name}: {count} grasps")
     for key, names, count in (("wrong", WRONG_SHORT + WRONG, max(1, more // 3)), ("requests", REQUESTS, more)):
         found[key] = []
         for name in names:
             for gripper in GRIPPERS:
-                call = (*MIXED, "--then", name, "--gripper", gripper, "--seed", options.seed, "--count", count)
-                found[key].append({"then": name, "gripper": gripper, **summary_of_held(found_by(options.build, *call)["each"])})
+                each = grasps(*MIXED, "--then", name, "--gripper", gripper, "--count", count)
+                found[key].append({"then": name, "gripper": gripper, **summary_of_held(each)})
         steps.report(f"{key} in a steady hold: {sum(row['grasps'] for row in found[key])} grasps")
     place, hand = ([row for row in found["requests"] if row["then"] == name] for name in REQUESTS)
     found |= {

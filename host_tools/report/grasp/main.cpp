@@ -49,9 +49,9 @@ struct Options {
 };
 
 // Instead of the kind's events, in a steady hold.
-void happens(KindTrial &trial, const Options &options, std::uint64_t n) {
+void happens(GraspTrial &trial, const Options &options, std::uint64_t n) {
   const Wrong *wrong = find_in(WRONG, [&](const Wrong &one) { return options.then == one.name; });
-  KindOfGrasp &grasp = trial.grasp;
+  GraspScenario &grasp = trial.grasp;
   const double steady_s = grasp.lift_s + STEADY_s;
   grasp.gone = -1;
   grasp.events.clear();
@@ -74,9 +74,9 @@ void happens(KindTrial &trial, const Options &options, std::uint64_t n) {
   }
 }
 
-KindTrial trial_of(const Options &options, std::uint64_t n) {
+GraspTrial trial_of(const Options &options, std::uint64_t n) {
   const auto kinds = split(options.kind, ',');
-  KindTrial trial;
+  GraspTrial trial;
   trial.grasp = draw_grasp(kind_of(std::string(kinds[n % kinds.size()])), options.seed, n / kinds.size());
   trial.gripper = gripper_mechanics(options.gripper);
   trial.seed = Random(options.seed, NOISE, n).next();
@@ -95,7 +95,7 @@ KindTrial trial_of(const Options &options, std::uint64_t n) {
   return trial;
 }
 
-GripSettings settings_with(const Options &options, const KindTrial &trial) {
+GripSettings settings_with(const Options &options, const GraspTrial &trial) {
   std::map<std::string, double> values;
   if (trial.grasp.kind == Kind::fragile) {
     values = preset_values(trial.grasp.object);
@@ -115,31 +115,30 @@ GripSettings settings_with(const Options &options, const KindTrial &trial) {
   return settings;
 }
 
-// What the pads touch, under 12 mm of rubber.
 const Face &face() {
-  static const Face found("sphere15", LAYER_mm, FINGERTIP_TABLES);
+  static const Face found("sphere15", FINGERTIP_TABLES);
   return found;
 }
 
 struct Done {
-  KindTrial trial;
-  KindOutcome outcome;
+  GraspTrial trial;
+  TrialOutcome outcome;
   GripSettings settings;
 };
 
-Done run_one(const Options &options, std::uint64_t n, const KindTrace &trace = {}) {
+Done run_one(const Options &options, std::uint64_t n, const TrialTrace &trace = {}) {
   Done done{trial_of(options, n), {}, {}};
   done.settings = settings_with(options, done.trial);
   const GripperTraits &traits = done.trial.gripper.traits;
   CoreController ours(done.settings, traits);
   Textbook textbook(traits);
-  done.outcome = run_kind(done.trial, face(), options.controller == "textbook" ? static_cast<Controller &>(textbook) : ours, trace);
+  done.outcome = run_trial(done.trial, face(), options.controller == "textbook" ? static_cast<Controller &>(textbook) : ours, trace);
   return done;
 }
 
 ordered_json line_of(std::uint64_t n, const Done &one) {
-  const KindOfGrasp &grasp = one.trial.grasp;
-  const KindOutcome &o = one.outcome;
+  const GraspScenario &grasp = one.trial.grasp;
+  const TrialOutcome &o = one.outcome;
   ordered_json line{{"n", n},
                     {"shape", name_of(grasp.shape)},
                     {"mass_kg", grasp.mass_kg},
@@ -187,22 +186,17 @@ ordered_json line_of(std::uint64_t n, const Done &one) {
   return line;
 }
 
-// All that is known of one grasp, every 2 ms.
-ordered_json traced(const Options &options, std::uint64_t n) {
-  ordered_json series;
-  const Done done = run_one(options, n, [&](const auto &moment) {
-    for (const auto &[name, value] : moment) {
-      series[name].push_back(value);
-    }
-  });
-  ordered_json out = line_of(n, done);
-  out["series"] = series;
-  return out;
-}
-
 ordered_json measured(const Options &options) {
   if (options.trace) {
-    return traced(options, *options.trace);
+    ordered_json series;
+    const Done done = run_one(options, *options.trace, [&](const auto &moment) {
+      for (const auto &[name, value] : moment) {
+        series[name].push_back(value);
+      }
+    });
+    ordered_json out = line_of(*options.trace, done);
+    out["series"] = series;
+    return out;
   }
   if (options.faults) {
     return {{"rows", fault_rows(face(), options.jobs)}};
@@ -226,13 +220,11 @@ int run(int argc, char **argv) {
       ->check(CLI::IsMember({"ours", "textbook", "fixed", "paper"}))
       ->capture_default_str();
   app.add_option("--set", options.settings, "Of our settings, split by commas: margin=1.4")->type_name("NAME=VALUE");
-  const auto number = [&](const char *name, double &value, const char *unit, const char *help) {
-    return app.add_option(name, value, help)->type_name(unit);
-  };
-  number("--later", options.later_ms, "MS", "All frames come later")->check(within(0.0, 1e4));
-  number("--rate", options.rate_Hz, "HZ", "Frames of a fingertip")->check(within(1.0, 1600.0))->capture_default_str();
+  app.add_option("--later", options.later_ms, "All frames come later")->type_name("MS")->check(within(0.0, 1e4));
+  app.add_option("--rate", options.rate_Hz, "Frames of a fingertip")->type_name("HZ")->check(within(1.0, 1600.0))->capture_default_str();
   app.add_flag("--loadless", options.loadless, "Fingertips do not know their pads: no tangential force");
-  number("--still", options.still_s, "S", "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
+  app.add_option("--still", options.still_s, "No lift: a set force of 2 to 15 N for this time; `paper` by eq. (5) and (6)")
+      ->type_name("S")
       ->check(within(1e-3, 1e4));
   std::vector<std::string> happenings = {"none", "place", "hand_over"};
   for (const Wrong &wrong : WRONG) {
@@ -246,16 +238,10 @@ int run(int argc, char **argv) {
   app.add_option("--jobs", options.jobs, "Threads")->check(within(1, 64))->capture_default_str();
   app.add_option("--trace", options.trace, "Instead: all that is known of this grasp, every 2 ms")->type_name("N");
   app.add_flag("--faults", options.faults, "Instead: every fault in every state of a grasp");
-  try {
-    app.parse(argc, argv);
+  return run_program(app, argc, argv, [&] {
     std::cout << measured(options).dump() << '\n';
     return std::cout.flush() ? 0 : 1;
-  } catch (const CLI::CallForHelp &help) {
-    return app.exit(help);
-  } catch (const std::exception &error) {
-    std::fprintf(stderr, "fingertip_grasp_kinds: %s\n", error.what());
-    return 1;
-  }
+  });
 }
 
 } // namespace

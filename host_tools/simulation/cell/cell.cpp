@@ -42,7 +42,7 @@ struct Size {
   const char *geom;
   double x_mm, y_mm, z_mm; // half of it: along the grip's axis, level, upwards
 };
-Size size_of(const KindOfGrasp &grasp) {
+Size size_of(const GraspScenario &grasp) {
   const double w = 0.5 * grasp.width_mm, h = 0.5 * grasp.height_mm, d = 0.5 * grasp.depth_mm;
   switch (grasp.shape) {
   case Shape::ball: return {"sphere", w, w, w};
@@ -56,7 +56,7 @@ Size size_of(const KindOfGrasp &grasp) {
   return {"sphere", w, w, w};
 }
 
-std::string xml_of(const KindOfGrasp &grasp) {
+std::string xml_of(const GraspScenario &grasp) {
   const Size size = size_of(grasp);
   const double x2 = size.x_mm * size.x_mm, y2 = size.y_mm * size.y_mm, z2 = size.z_mm * size.z_mm;
   const double turn = std::atan2(-std::cos(grasp.down_rad), -std::sin(grasp.down_rad));
@@ -103,7 +103,7 @@ struct FreeModel {
   void operator()(mjData *data) const { mj_deleteData(data); }
 };
 
-std::unique_ptr<mjModel, FreeModel> compiled(const KindOfGrasp &grasp) {
+std::unique_ptr<mjModel, FreeModel> compiled(const GraspScenario &grasp) {
   static std::mutex one_at_a_time;
   const std::lock_guard lock(one_at_a_time);
   mju_user_warning = [](const char *) {}; // World::step throws, and no file MUJOCO_LOG.TXT appears
@@ -118,27 +118,9 @@ std::unique_ptr<mjModel, FreeModel> compiled(const KindOfGrasp &grasp) {
   return model;
 }
 
-} // namespace
-
-struct Cell::World {
-  struct Point {
-    double level_m, up_m, force_N; // from the middle of the face
-  };
-  struct Pad {
-    KindOfPad kind;
-    double gives_mm_N; // of finger and object
-    int face, dof;
-    std::array<double, 2> strength{}, follows_N{};
-    double elastic_N = 0.0, force_N = 0.0, friction = 0.0;
-    std::array<double, 3> pulled_m{}; // the rubber's face: level, upwards, turned at the arm of the patch
-    Vector load_N, slide_mm_s;
-    std::vector<Point> points;
-    std::array<mjtNum, 3> middle_m{}; // of their force
-    double arm_m = 0.0;
-    bool slides = true;
-  };
-
-  explicit World(const KindOfGrasp &of) : grasp(of), model(compiled(of)), data(mj_makeData(model.get())) {
+class MujocoCell final : public Cell {
+public:
+  explicit MujocoCell(const GraspScenario &of) : grasp(of), model(compiled(of)), data(mj_makeData(model.get())) {
     table = mj_name2id(model.get(), mjOBJ_GEOM, "table");
     object = mj_name2id(model.get(), mjOBJ_BODY, "object");
     turn = std::atan2(-std::cos(of.down_rad), -std::sin(of.down_rad));
@@ -151,6 +133,90 @@ struct Cell::World {
       pads[i].strength = twin::relaxation_strengths(of.pads[i].relaxation);
     }
   }
+
+  void run(double seconds, double width_mm, const GraspScenario::Inputs &inputs) override {
+    for (due_s += seconds; due_s > 0.5 * STEP_s; due_s -= STEP_s) {
+      step(width_mm, inputs);
+    }
+  }
+  double force_N(std::size_t finger) const override { return pads[finger].force_N; }
+  double force_at_N(double width_mm) const override {
+    double force_N = 0.0;
+    const double along_mm = data->xpos[3 * object] / M;
+    for (std::size_t i = 0; i < pads.size(); i++) {
+      const double pressed_mm = 0.5 * (grasp.width_mm - width_mm) + (i == 0 ? -along_mm : along_mm);
+      force_N = std::max(force_N, elastic_N(pads[i], pressed_mm) - std::max(pads[i].elastic_N - pads[i].force_N, 0.0));
+    }
+    return force_N;
+  }
+  Vector load_N(std::size_t finger) const override { return pads[finger].load_N; }
+  Vector way_mm() const override { return {data->xpos[3 * object + 1] / M, data->xpos[3 * object + 2] / M}; }
+  double turned_rad() const override {
+    const mjtNum *turned = &data->xquat[4 * object];
+    return 2.0 * std::atan2(turned[1], turned[0]);
+  }
+  bool slips() const override { return pads[0].slides && pads[1].slides; }
+  double slid_mm() const override { return all_slid_mm; }
+  double friction(std::size_t finger) const override { return pads[finger].friction; }
+  Patch patch(std::size_t finger) const override {
+    const Pad &pad = pads[finger];
+    Patch patch;
+    if (pad.points.empty() || pad.force_N <= 0.0) {
+      return patch;
+    }
+    // Along the object's own level axis, and across: extents, and the centre of pressure.
+    const double turned = turned_rad(), c = std::cos(turned), s = std::sin(turned);
+    double all_N = 0.0, u_mm = 0.0, v_mm = 0.0;
+    double u_low = 1e9, u_high = -1e9, v_low = 1e9, v_high = -1e9;
+    for (const Point &point : pad.points) {
+      all_N += point.force_N;
+    }
+    for (const Point &point : pad.points) {
+      if (point.force_N < LEAST_SHARE * all_N) {
+        continue;
+      }
+      const double u = (c * point.level_m + s * point.up_m) / M, v = (c * point.up_m - s * point.level_m) / M;
+      u_mm += point.force_N / all_N * u;
+      v_mm += point.force_N / all_N * v;
+      u_low = std::min(u_low, u), u_high = std::max(u_high, u);
+      v_low = std::min(v_low, v), v_high = std::max(v_high, v);
+    }
+    const double mirror = finger == 0 ? 1.0 : -1.0;
+    const double tc = std::cos(turn), ts = std::sin(turn);
+    const auto in_own = [&](double level, double up) { return Vector{mirror * (tc * level + ts * up), tc * up - ts * level}; };
+    const Vector at = in_own(c * u_mm - s * v_mm, s * u_mm + c * v_mm), pull = in_own(pad.load_N.x, pad.load_N.y);
+    patch.force_N = pad.force_N;
+    patch.x_mm = at.x;
+    patch.y_mm = at.y;
+    patch.angle_rad = mirror * (turned - turn);
+    patch.pull_x_N = pull.x;
+    patch.pull_y_N = pull.y;
+    const double pull_N = std::hypot(pull.x, pull.y);
+    patch.stuck_N = pad.slides ? 0.0 : twin::stuck_force_N(pad.force_N, pull_N, pad.friction);
+    patch.length_mm = u_high - u_low;
+    patch.width_mm = v_high - v_low;
+    patch.off_length_mm = mirror * (u_mm - 0.5 * (u_low + u_high));
+    patch.off_width_mm = v_mm - 0.5 * (v_low + v_high);
+    return patch;
+  }
+
+private:
+  struct Point {
+    double level_m, up_m, force_N; // from the middle of the face
+  };
+  struct Pad {
+    PadProperties kind;
+    double gives_mm_N; // of finger and object
+    int face, dof;
+    std::array<double, 2> strength{}, follows_N{};
+    double elastic_N = 0.0, force_N = 0.0, friction = 0.0;
+    std::array<double, 3> pulled_m{}; // the rubber's face: level, upwards, turned at the arm of the patch
+    Vector load_N, slide_mm_s;
+    std::vector<Point> points;
+    std::array<mjtNum, 3> middle_m{}; // of their force
+    double arm_m = 0.0;
+    bool slides = true;
+  };
 
   double elastic_N(const Pad &pad, double pressed_mm) const {
     // pressed = (F / A)^(1/n) + gives F, by Newton's steps from above.
@@ -240,7 +306,7 @@ struct Cell::World {
   }
 
   // Where it touches.
-  void look(Pad &pad) {
+  void find_contacts(Pad &pad) {
     pad.points.clear();
     const mjtNum *face_m = &data->geom_xpos[3 * pad.face];
     double sum_N = 0.0, apart_m = 0.0;
@@ -269,7 +335,7 @@ struct Cell::World {
     pad.arm_m = std::hypot(twist_arm_m(pad.force_N), EVENLY * apart_m);
   }
 
-  void step(double width_mm, const KindOfGrasp::Inputs &inputs) {
+  void step(double width_mm, const GraspScenario::Inputs &inputs) {
     const double finger_mm = 0.5 * (grasp.width_mm - width_mm);
     const bool jumps = std::abs(finger_mm - finger_before_mm) > JUMPS_mm;
     const double finger_mm_s = jumps ? 0.0 : (finger_mm - finger_before_mm) / STEP_s;
@@ -303,103 +369,25 @@ struct Cell::World {
       throw std::runtime_error("MuJoCo's object diverged");
     }
     for (Pad &pad : pads) {
-      look(pad);
+      find_contacts(pad);
     }
-    if (pads[0].slides && pads[1].slides) {
+    if (slips()) {
       const Vector &one = pads[0].slide_mm_s, &other = pads[1].slide_mm_s;
-      slid_mm += 0.5 * STEP_s * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y));
+      all_slid_mm += 0.5 * STEP_s * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y));
     }
   }
 
-  double turned_rad() const {
-    const mjtNum *turned = &data->xquat[4 * object];
-    return 2.0 * std::atan2(turned[1], turned[0]);
-  }
-
-  const KindOfGrasp &grasp;
+  const GraspScenario &grasp;
   std::unique_ptr<mjModel, FreeModel> model;
   std::unique_ptr<mjData, FreeModel> data;
   std::array<Pad, 2> pads;
   int table, object;
   double turn, table_m; // turn: from the hand's x to fingertip 0's
-  double due_s = 0.0, finger_before_mm = 1e9, slid_mm = 0.0;
+  double due_s = 0.0, finger_before_mm = 1e9, all_slid_mm = 0.0;
 };
 
-Cell::Cell(const KindOfGrasp &grasp) : world_(std::make_unique<World>(grasp)) {}
-Cell::~Cell() = default;
+} // namespace
 
-void Cell::run(double seconds, double width_mm, const KindOfGrasp::Inputs &inputs) {
-  world_->due_s += seconds;
-  for (; world_->due_s > 0.5 * STEP_s; world_->due_s -= STEP_s) {
-    world_->step(width_mm, inputs);
-  }
-}
-
-double Cell::force_N(std::size_t finger) const { return world_->pads[finger].force_N; }
-
-double Cell::force_at_N(double width_mm) const {
-  double force_N = 0.0;
-  const double along_mm = world_->data->xpos[3 * world_->object] / M;
-  for (std::size_t i = 0; i < world_->pads.size(); i++) {
-    const World::Pad &pad = world_->pads[i];
-    const double pressed_mm = 0.5 * (world_->grasp.width_mm - width_mm) + (i == 0 ? -along_mm : along_mm);
-    force_N = std::max(force_N, world_->elastic_N(pad, pressed_mm) - std::max(pad.elastic_N - pad.force_N, 0.0));
-  }
-  return force_N;
-}
-
-Vector Cell::load_N(std::size_t finger) const { return world_->pads[finger].load_N; }
-
-Vector Cell::way_mm() const {
-  const mjtNum *at = &world_->data->xpos[3 * world_->object];
-  return {at[1] / M, at[2] / M};
-}
-
-double Cell::turned_rad() const { return world_->turned_rad(); }
-bool Cell::slips() const { return world_->pads[0].slides && world_->pads[1].slides; }
-double Cell::slid_mm() const { return world_->slid_mm; }
-double Cell::friction(std::size_t finger) const { return world_->pads[finger].friction; }
-
-Patch Cell::patch(std::size_t finger) const {
-  const World::Pad &pad = world_->pads[finger];
-  Patch patch;
-  if (pad.points.empty() || pad.force_N <= 0.0) {
-    return patch;
-  }
-  // Along the object's own level axis, and across: extents, and the centre of pressure.
-  const double turned = world_->turned_rad(), c = std::cos(turned), s = std::sin(turned);
-  double all_N = 0.0, u_mm = 0.0, v_mm = 0.0;
-  double u_low = 1e9, u_high = -1e9, v_low = 1e9, v_high = -1e9;
-  for (const World::Point &point : pad.points) {
-    all_N += point.force_N;
-  }
-  for (const World::Point &point : pad.points) {
-    if (point.force_N < LEAST_SHARE * all_N) {
-      continue;
-    }
-    const double u = (c * point.level_m + s * point.up_m) / M, v = (c * point.up_m - s * point.level_m) / M;
-    u_mm += point.force_N / all_N * u;
-    v_mm += point.force_N / all_N * v;
-    u_low = std::min(u_low, u), u_high = std::max(u_high, u);
-    v_low = std::min(v_low, v), v_high = std::max(v_high, v);
-  }
-  const double mirror = finger == 0 ? 1.0 : -1.0;
-  const double tc = std::cos(world_->turn), ts = std::sin(world_->turn);
-  const auto in_own = [&](double level, double up) { return Vector{mirror * (tc * level + ts * up), tc * up - ts * level}; };
-  const Vector at = in_own(c * u_mm - s * v_mm, s * u_mm + c * v_mm), pull = in_own(pad.load_N.x, pad.load_N.y);
-  patch.force_N = pad.force_N;
-  patch.x_mm = at.x;
-  patch.y_mm = at.y;
-  patch.angle_rad = mirror * (turned - world_->turn);
-  patch.pull_x_N = pull.x;
-  patch.pull_y_N = pull.y;
-  const double pull_N = std::hypot(pull.x, pull.y);
-  patch.stuck_N = pad.slides ? 0.0 : twin::stuck_force_N(pad.force_N, pull_N, pad.friction);
-  patch.length_mm = u_high - u_low;
-  patch.width_mm = v_high - v_low;
-  patch.off_length_mm = mirror * (u_mm - 0.5 * (u_low + u_high));
-  patch.off_width_mm = v_mm - 0.5 * (v_low + v_high);
-  return patch;
-}
+std::unique_ptr<Cell> make_cell(const GraspScenario &grasp) { return std::make_unique<MujocoCell>(grasp); }
 
 } // namespace fingertip::cell

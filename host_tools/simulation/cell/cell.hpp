@@ -30,30 +30,25 @@ public:
   static constexpr double SLIDES_mm_s = 1.0, FACE_kg = 0.02;
   static constexpr double FINGERS_N_mm = 50.0; // both fingers' own stiffness in a row; assumed
 
-  // grasp must outlive it. Throws Error: this program was built without MuJoCo.
-  explicit Cell(const KindOfGrasp &grasp);
-  ~Cell();
-  Cell(const Cell &) = delete;
-  Cell &operator=(const Cell &) = delete;
+  virtual ~Cell() = default;
 
   // Advances by this time, in as many whole steps as are due; the gripper's width is as now.
-  void run(double seconds, double width_mm, const KindOfGrasp::Inputs &inputs);
+  virtual void run(double seconds, double width_mm, const GraspScenario::Inputs &inputs) = 0;
 
-  double force_N(std::size_t finger) const;
+  virtual double force_N(std::size_t finger) const = 0;
   double mean_N() const { return 0.5 * (force_N(0) + force_N(1)); }
   // What the gripper at this width would press against now.
-  double force_at_N(double width_mm) const;
-  Vector load_N(std::size_t finger) const; // of the object on the rubber, in the hand's frame
-  Patch patch(std::size_t finger) const;   // in the fingertip's own
-  Vector way_mm() const;                   // of the object's middle, from where it was
-  double turned_rad() const;               // about the grip's axis
-  bool slips() const;                      // both sides slide
-  double slid_mm() const;                  // while both did, in all
-  double friction(std::size_t finger) const;
-
-private:
-  struct World;
-  std::unique_ptr<World> world_;
+  virtual double force_at_N(double width_mm) const = 0;
+  virtual Vector load_N(std::size_t finger) const = 0; // of the object on the rubber, in the hand's frame
+  virtual Patch patch(std::size_t finger) const = 0;   // in the fingertip's own
+  virtual Vector way_mm() const = 0;                   // of the object's middle, from where it was
+  virtual double turned_rad() const = 0;               // about the grip's axis
+  virtual bool slips() const = 0;                      // both sides slide
+  virtual double slid_mm() const = 0;                  // while both did, in all
+  virtual double friction(std::size_t finger) const = 0;
 };
+
+// grasp must outlive it. Throws Error: this program was built without MuJoCo.
+std::unique_ptr<Cell> make_cell(const GraspScenario &grasp);
 
 } // namespace fingertip::cell

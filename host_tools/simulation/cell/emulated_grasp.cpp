@@ -2,7 +2,6 @@
 // the protocol of host_tools/simulation/emulator/lockstep.mjs on its standard input and output: the cell, the gripper and the controller go
 // on by slices of emulated time, after each of which the boards' bytes are handed over. The controller takes what came in a slice at its
 // end, so up to a slice late; all else is at its own time.
-#include "grasp/fingertip.hpp"
 #include "grasp/gripper/gripper.hpp"
 #include "libfingertip/clock_fit.hpp"
 #include "libfingertip/command.hpp"
@@ -23,7 +22,6 @@ extern "C" {
 #include <cmath>
 #include <cstdio>
 #include <deque>
-#include <exception>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -119,7 +117,7 @@ private:
     commands_.pop_front();
   }
 
-  Pressures gain_{};
+  Pressures gain_ = Pressures(SENSORS);
   std::deque<wire_packet> commands_; // the first may be under way
   bool awaits_ = false, tared_ = false;
   std::uint16_t sequence_ = 0;
@@ -128,8 +126,8 @@ private:
 };
 
 // Lifted, and then friction falls so far, within 30 ms, that the grip does not hold it.
-KindOfGrasp grasp_of(double friction_falls) {
-  KindOfGrasp grasp;
+GraspScenario grasp_of(double friction_falls) {
+  GraspScenario grasp;
   grasp.pads[0].friction = 1.03 * FRICTION;
   grasp.pads[1].friction = 0.97 * FRICTION;
   grasp.com_mm = {3.0, 1.0};
@@ -144,7 +142,6 @@ KindOfGrasp grasp_of(double friction_falls) {
   return grasp;
 }
 
-// To a microsecond.
 ordered_json to_us(double s, double per_unit = 1e6) {
   return std::isfinite(s) ? ordered_json(std::round(1e6 * s) / per_unit) : ordered_json(nullptr);
 }
@@ -152,10 +149,10 @@ ordered_json to_us(double s, double per_unit = 1e6) {
 class EmulatedGrasp {
 public:
   // All must outlive it.
-  EmulatedGrasp(const KindOfGrasp &grasp, const GripperMechanics &gripper, const Face &face, const pad_profile &profile)
+  EmulatedGrasp(const GraspScenario &grasp, const GripperMechanics &gripper, const Face &face, const pad_profile &profile)
       : grasp_(grasp), gripper_(gripper, grasp.width_mm + grasp.opens_mm, Random(SEED, LINE, 0)),
-        world_({grasp, false, {}, std::nullopt}, face, gripper_.motion()), fingers_{EmulatedFingertip(profile, Random(SEED, PAD, 0)),
-                                                                                    EmulatedFingertip(profile, Random(SEED, PAD, 1))} {}
+        world_({grasp, false, {}}, face, gripper_.motion()), fingers_{EmulatedFingertip(profile, Random(SEED, PAD, 0)),
+                                                                      EmulatedFingertip(profile, Random(SEED, PAD, 1))} {}
 
   // What a board sent at this time, since the last run().
   void take(std::size_t finger, const Bytes &bytes, double arrived_s) {
@@ -250,7 +247,7 @@ private:
             {"reaction_ms", in_ms(slip.reaction_s.value_or(NEVER_s))}};
   }
 
-  const KindOfGrasp &grasp_;
+  const GraspScenario &grasp_;
   GripperLine gripper_;
   World world_;
   std::array<EmulatedFingertip, 2> fingers_;
@@ -284,9 +281,9 @@ void put_u32(std::size_t value) {
 }
 
 int serve(const std::string &cache, double friction_falls) {
-  const Face face(FACE, LAYER_mm, cache);
+  const Face face(FACE, cache);
   const pad_profile profile = pad::profile_over_own_sensors({LAYER_mm, 0.0, false});
-  const KindOfGrasp held = grasp_of(friction_falls);
+  const GraspScenario held = grasp_of(friction_falls);
   const GripperMechanics gripper = gripper_mechanics(gripper_models().front().model);
   EmulatedGrasp grasp(held, gripper, face, profile);
   Bytes bytes;
@@ -336,11 +333,5 @@ int main(int argc, char **argv) {
   double friction_falls = 0.5;
   app.add_option("--friction-falls", friction_falls, "By this share")->check(fingertip::within(0.0, 0.9))->capture_default_str();
   app.add_option("--cache", cache, "Folder of the contact tables")->required();
-  CLI11_PARSE(app, argc, argv);
-  try {
-    return fingertip::cell::serve(cache, friction_falls);
-  } catch (const std::exception &error) {
-    std::fprintf(stderr, "fingertip_cell_emulated: %s\n", error.what());
-    return 1;
-  }
+  return fingertip::run_program(app, argc, argv, [&] { return fingertip::cell::serve(cache, friction_falls); });
 }

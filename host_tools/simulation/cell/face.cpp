@@ -2,16 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 namespace fingertip::cell {
 
-Face::Face(const std::string &name, double layer_mm, const std::filesystem::path &cache)
-    : layer_mm_(layer_mm), table_(twin::ContactTable::load_or_build(twin::indenter(name), twin::silicone(layer_mm), cache)),
-      traction_(table_, twin::silicone(layer_mm)) {}
+Face::Face(const std::string &name, const std::filesystem::path &cache)
+    : table_(twin::ContactTable::load_or_build(twin::indenter(name), twin::silicone(LAYER_mm), cache)),
+      traction_(table_, twin::silicone(LAYER_mm)) {}
 
 Pressures Face::base_Pa(const Patch &patch) const {
-  Pressures base_Pa{};
+  Pressures base_Pa(SENSORS);
   if (!(patch.force_N > 0.0)) {
     return base_Pa;
   }
@@ -28,7 +27,7 @@ Pressures Face::base_Pa(const Patch &patch) const {
     for (int j = 0; j < across; j++) {
       const double u = a_mm * ((2 * i + 1.0) / along - 1.0), v = b_mm * ((2 * j + 1.0) / across - 1.0);
       const double held_in =
-          2.0 / (layer_mm_ * layer_mm_) * (a_mm * a_mm - u * u) * (b_mm * b_mm - v * v) / std::max(a_mm * a_mm + b_mm * b_mm, 1e-9);
+          2.0 / (LAYER_mm * LAYER_mm) * (a_mm * a_mm - u * u) * (b_mm * b_mm - v * v) / std::max(a_mm * a_mm + b_mm * b_mm, 1e-9);
       nodes.push_back({u, v, 1.0 + held_in});
       sum += nodes.back().weight;
     }

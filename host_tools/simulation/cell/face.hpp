@@ -15,15 +15,15 @@ extern "C" {
 #include "simulation/twin/traction_table.hpp"
 #include "simulation/twin/trajectory.hpp"
 
-#include <array>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace fingertip::cell {
 
 inline const std::size_t SENSORS = geometry.sensor_count;
-constexpr double AIR_Pa = 101325.0, LAYER_mm = 12.0;  // of rubber
-using Pressures = std::array<double, FT_MAX_SENSORS>; // [sensor] Pa, on the base
+constexpr double AIR_Pa = 101325.0, LAYER_mm = 12.0; // of rubber
+using Pressures = std::vector<double>;               // [sensor] Pa, on the base
 
 // Its place is the centre of pressure, its angle that of its length.
 struct Patch : twin::Touch {
@@ -50,7 +50,7 @@ inline calibration calibrated(const Pressures &gain, double gain_sd, double forc
 class Face {
 public:
   // Solved once and kept in the cache (contact_table.hpp). Throws std::runtime_error for a name that there is not.
-  Face(const std::string &name, double layer_mm, const std::filesystem::path &cache);
+  Face(const std::string &name, const std::filesystem::path &cache);
 
   Pressures base_Pa(const Patch &patch) const;
 
@@ -59,7 +59,6 @@ private:
 
   void add(const twin::Touch &touch, Pressures &base_Pa) const;
 
-  double layer_mm_;
   twin::ContactTable table_;
   twin::TractionTable traction_;
 };

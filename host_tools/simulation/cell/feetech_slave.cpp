@@ -1,5 +1,5 @@
 // The memory of a simulated Feetech STS3215 (gripper/feetech.hpp) over its jaw's motion, and what it
-// answers to the instructions of the maker's SDK.
+// answers to the maker's instructions PING, READ and WRITE.
 #include "grasp/gripper/feetech.hpp"
 #include "simulation/cell/gripper_server.hpp"
 
@@ -40,45 +40,14 @@ public:
   Bytes answer(const Bytes &frame, bool refuse) override {
     const Packet question = packet_of(frame);
     const Bytes &given = question.parameters;
-    const bool all = question.id == BROADCAST;
-    if (!all && question.id != id_) {
+    const bool is_known = question.code == PING || question.code == WRITE || (question.code == READ && given.size() == 2);
+    if (question.id != id_ || !is_known) {
       return {};
     }
-    Packet answer = {.id = id_, .code = trouble_};
-    switch (question.code) {
-    case PING: break;
-    case READ:
-      if (given.size() != 2 || all) {
-        return {};
-      }
-      answer = read(given);
-      break;
-    case WRITE: write(given); break;
-    case REG_WRITE: waiting_ = given; break;
-    case ACTION:
-      write(waiting_);
-      waiting_.clear();
-      break;
-    case SYNC_WRITE: // address, length, then of each servo its id and its bytes
-      for (std::size_t at = 2; given.size() > 2 && at + given[1] < given.size(); at += given[1] + 1u) {
-        if (given[at] == id_) {
-          Bytes own = {given[0]};
-          own.insert(own.end(), given.begin() + std::ptrdiff_t(at) + 1, given.begin() + std::ptrdiff_t(at) + 1 + given[1]);
-          write(own);
-        }
-      }
-      return {};
-    case SYNC_READ: // address, length, ids; each answers in turn, this one as the only servo
-      if (given.size() < 3 || std::find(given.begin() + 2, given.end(), id_) == given.end()) {
-        return {};
-      }
-      answer = read(given);
-      break;
-    default: return {};
+    if (question.code == WRITE) {
+      write(given);
     }
-    if (all && question.code != PING && question.code != SYNC_READ) {
-      return {};
-    }
+    Packet answer = question.code == READ ? read(given) : Packet{.id = id_, .code = trouble_};
     answer.code |= refuse ? std::uint8_t{OVERLOAD} : std::uint8_t{0};
     return encoded(answer);
   }
@@ -92,7 +61,6 @@ public:
   void lose_power() override {
     motion_.power_off();
     memory_ = {};
-    waiting_.clear();
     trouble_ = 0;
     put(MODEL, STS3215);
     memory_[ID] = id_;
@@ -167,7 +135,6 @@ private:
   Jaw jaw_;
   std::uint8_t id_;
   std::array<std::uint8_t, 128> memory_{};
-  Bytes waiting_; // of REG_WRITE
   std::uint8_t trouble_ = 0;
 };
 

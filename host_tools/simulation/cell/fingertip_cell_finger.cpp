@@ -45,15 +45,15 @@ public:
         wait_until(host_now() + finger_.round);
         continue;
       }
-      look_at_port();
+      poll_port();
       const std::int64_t known_us = pressures_.newest_us();
-      while (!asked_.empty() && asked_.front().host_us <= known_us) {
-        const Asked &asked = asked_.front();
-        run_to(asked.host_us);
-        if (native_cdc_send(asked.bytes.data(), asked.bytes.size()) != FT_OK) {
+      while (!requests_.empty() && requests_.front().host_us <= known_us) {
+        const Request &request = requests_.front();
+        run_to(request.host_us);
+        if (native_cdc_send(request.bytes.data(), request.bytes.size()) != FT_OK) {
           break; // held off, as by USB
         }
-        asked_.pop_front();
+        requests_.pop_front();
       }
       run_to(known_us);
       pressures_.reached_us = known_us;
@@ -62,7 +62,7 @@ public:
   }
 
 private:
-  struct Asked { // by the host
+  struct Request { // by the host
     std::int64_t host_us;
     std::vector<std::uint8_t> bytes;
   };
@@ -138,7 +138,7 @@ private:
     device_us_ = t_us;
   }
 
-  void look_at_port() {
+  void poll_port() {
     port_.wait(host_now() + finger_.round);
     if (port_.is_open() != is_open_) {
       is_open_ = port_.is_open();
@@ -147,14 +147,14 @@ private:
       } else {
         native_cdc_stall(false);
         native_cdc_close();
-        asked_.clear();
-        left_.clear();
+        requests_.clear();
+        unsent_.clear();
       }
     }
     std::uint8_t bytes[NATIVE_CDC_RECEIVE_BYTES];
     if (const std::size_t count = port_.read(bytes, sizeof bytes)) {
-      asks_.feed(bytes, count, [this](const wire_packet &packet) { pressures_.rates_set += packet.type == WIRE_CMD_RATE; });
-      asked_.push_back({steady_now_us(), {bytes, bytes + count}});
+      decoder_.feed(bytes, count, [this](const wire_packet &packet) { pressures_.rates_set += packet.type == WIRE_CMD_RATE; });
+      requests_.push_back({steady_now_us(), {bytes, bytes + count}});
     }
   }
 
@@ -162,17 +162,17 @@ private:
   void answer() {
     std::uint8_t bytes[NATIVE_CDC_TRANSMIT_BYTES];
     for (;;) {
-      if (left_.empty()) {
+      if (unsent_.empty()) {
         native_cdc_stall(false);
         const std::size_t count = native_cdc_receive(bytes, sizeof bytes);
-        left_.assign(bytes, bytes + count);
+        unsent_.assign(bytes, bytes + count);
       }
-      if (left_.empty() || !is_open_) {
+      if (unsent_.empty() || !is_open_) {
         return;
       }
-      const std::size_t taken = port_.write(left_.data(), left_.size());
-      left_.erase(left_.begin(), left_.begin() + static_cast<std::ptrdiff_t>(taken));
-      if (!left_.empty()) {
+      const std::size_t taken = port_.write(unsent_.data(), unsent_.size());
+      unsent_.erase(unsent_.begin(), unsent_.begin() + static_cast<std::ptrdiff_t>(taken));
+      if (!unsent_.empty()) {
         native_cdc_stall(true);
         return;
       }
@@ -184,9 +184,9 @@ private:
   const pad_profile pad_;
   ServedPort port_;
   bool is_open_ = false;
-  std::deque<Asked> asked_;
-  Decoder asks_;
-  std::vector<std::uint8_t> left_; // of what the firmware has sent
+  std::deque<Request> requests_;
+  Decoder decoder_;
+  std::vector<std::uint8_t> unsent_; // of what the firmware has sent
   std::uint64_t device_us_ = 0;
   std::optional<std::int64_t> zero_us_; // host's time of the fingertip's 0
 };
@@ -195,7 +195,7 @@ private:
 
 void SharedPressures::put(std::int64_t host_us, const Pressures &pressures) {
   const std::uint64_t count = count_.load(std::memory_order_relaxed);
-  Moment &next = moments_[count % KEPT];
+  Sample &next = samples_[count % KEPT];
   next.host_us.store(host_us, std::memory_order_relaxed);
   for (std::size_t k = 0; k < SENSORS; k++) {
     next.pressure_Pa[k].store(static_cast<float>(pressures[k]), std::memory_order_relaxed);
@@ -211,9 +211,9 @@ double SharedPressures::at(std::int64_t host_us, std::size_t sensor) const {
   // Only half of them, so that none is overwritten while it is read.
   const std::uint64_t oldest = count > KEPT / 2 ? count - KEPT / 2 : 0;
   std::uint64_t i = count - 1;
-  const auto time_us = [&](std::uint64_t number) { return moment(number).host_us.load(std::memory_order_relaxed); };
+  const auto time_us = [&](std::uint64_t number) { return sample(number).host_us.load(std::memory_order_relaxed); };
   const auto pressure_Pa = [&](std::uint64_t number) {
-    return static_cast<double>(moment(number).pressure_Pa[sensor].load(std::memory_order_relaxed));
+    return static_cast<double>(sample(number).pressure_Pa[sensor].load(std::memory_order_relaxed));
   };
   while (i > oldest && time_us(i) > host_us) {
     i--;

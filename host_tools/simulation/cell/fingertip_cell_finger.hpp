@@ -25,7 +25,7 @@ public:
   // The time of the newest; 0: none yet.
   std::int64_t newest_us() const {
     const std::uint64_t count = count_.load(std::memory_order_acquire);
-    return count == 0 ? 0 : moment(count - 1).host_us.load(std::memory_order_relaxed);
+    return count == 0 ? 0 : sample(count - 1).host_us.load(std::memory_order_relaxed);
   }
   // In between straight; before the oldest that is kept, 0.5 s, as then; the same after the newest.
   double at(std::int64_t host_us, std::size_t sensor) const;
@@ -41,20 +41,20 @@ public:
 
 private:
   static constexpr std::uint64_t KEPT = 1024;
-  struct Moment {
+  struct Sample {
     std::atomic<std::int64_t> host_us;
     std::array<std::atomic<float>, FT_MAX_SENSORS> pressure_Pa;
   };
-  const Moment &moment(std::uint64_t number) const { return moments_[number % KEPT]; }
+  const Sample &sample(std::uint64_t number) const { return samples_[number % KEPT]; }
 
-  std::array<Moment, KEPT> moments_{};
+  std::array<Sample, KEPT> samples_{};
   std::atomic<std::uint64_t> count_{0};
 };
 
 struct FingerProcess {
   std::string serial, link; // of its port; what is in the link's way and no link is an error
   std::uint64_t seed = 1;
-  Pressures gain{};                    // of its sensors, as they are
+  Pressures gain;                      // of its sensors, as they are
   std::optional<double> calibrated_sd; // share by which its calibration is off; none: it has none
   bool parallel_bus = false;           // sim_array.h
   std::chrono::milliseconds round{1};  // the longest that it does not look at its port

@@ -24,8 +24,8 @@ constexpr Known KNOWN[] = {{Event::Kind::pour, 0.0, 5.0, 1.0},
                            {Event::Kind::slick, 0.0, 0.95, 0.5},
                            {Event::Kind::lower, 0.2, 10.0, 0.0}};
 
-KindOfGrasp grasp_of(const World::Options &options) {
-  KindOfGrasp grasp = options.grasp;
+GraspScenario grasp_of(const World::Options &options) {
+  GraspScenario grasp = options.grasp;
   for (Event event : options.planned) {
     event.begin_s += grasp.lift_s;
     grasp.events.push_back(event);
@@ -56,9 +56,9 @@ bool is_disturbance(const std::string &name) {
 }
 
 World::World(const Options &options, const Face &face, GripperMotion &motion)
-    : options_(options), grasp_(grasp_of(options)), face_(face), motion_(motion), cell_(grasp_) {
+    : options_(options), grasp_(grasp_of(options)), face_(face), motion_(motion), cell_(make_cell(grasp_)) {
   motion.blocked_at = [this](double width_mm, double force_N) {
-    return is_there_ && force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
+    return is_there_ && force_N > 0.0 && cell_->force_at_N(width_mm) >= force_N;
   };
 }
 
@@ -85,7 +85,7 @@ void World::advance(double seconds) {
     const double step_s = std::min(STEP_s, left_s);
     motion_.step(step_s);
     if (is_there_) {
-      cell_.run(step_s, motion_.width_mm(), grasp_.inputs(lift_s_ ? since_lift_s() + 0.5 * step_s : -1.0));
+      cell_->run(step_s, motion_.width_mm(), grasp_.inputs(lift_s_ ? since_lift_s() + 0.5 * step_s : -1.0));
     }
     time_s_ += step_s;
     watch_force();
@@ -94,7 +94,7 @@ void World::advance(double seconds) {
 }
 
 void World::watch_force() {
-  const double force_N = is_there_ ? cell_.mean_N() : 0.0;
+  const double force_N = is_there_ ? cell_->mean_N() : 0.0;
   peak_N_ = std::max(peak_N_, force_N);
   if (force_N > grasp_.crushes_N && !is_crushed_) {
     is_crushed_ = true;
@@ -123,13 +123,13 @@ void World::watch_object() {
     }
   }
   const bool slipped = slips_.go_on();
-  slips_.sample(time_s_, cell_.slips(), cell_.mean_N(), cell_.slid_mm());
+  slips_.sample(time_s_, cell_->slips(), cell_->mean_N(), cell_->slid_mm());
   if (slips_.go_on() != slipped) {
     events_.push_back(slipped ? "caught after " + fixed(slips_.slips.back().way_mm, 2) + " mm" : "slip");
   }
-  const Vector way = cell_.way_mm();
+  const Vector way = cell_->way_mm();
   const bool in_the_air = lift_s_ && !grasp_.inputs(since_s).table;
-  if (std::hypot(way.x, way.y) >= DROP_mm || (in_the_air && cell_.mean_N() < LOST_N)) {
+  if (std::hypot(way.x, way.y) >= DROP_mm || (in_the_air && cell_->mean_N() < LOST_N)) {
     is_dropped_ = true;
     slips_.end();
     is_there_ = false;
@@ -140,18 +140,18 @@ void World::watch_object() {
 std::string World::cells() const {
   double load_N = 0.0;
   for (const std::size_t finger : {0U, 1U}) {
-    const Vector load = cell_.load_N(finger);
+    const Vector load = cell_->load_N(finger);
     load_N += is_there_ ? 0.5 * std::hypot(load.x, load.y) : 0.0;
   }
   const double since_s = since_lift_s();
   const double least_N = is_there_ && since_s >= grasp_.lift_s ? grasp_.least_N(since_s) : 0.0;
-  const double friction = 0.5 * (cell_.friction(0) + cell_.friction(1));
+  const double friction = 0.5 * (cell_->friction(0) + cell_->friction(1));
   std::string text = fixed(time_s_, 5);
-  for (const double value : {motion_.width_mm(), is_there_ ? cell_.mean_N() : 0.0, peak_N_, load_N, least_N, cell_.slid_mm(),
-                             -cell_.way_mm().y, friction, grasp_.inputs(since_s).lifted_mm}) {
+  for (const double value : {motion_.width_mm(), is_there_ ? cell_->mean_N() : 0.0, peak_N_, load_N, least_N, cell_->slid_mm(),
+                             -cell_->way_mm().y, friction, grasp_.inputs(since_s).lifted_mm}) {
     text += "," + fixed(value, 4);
   }
-  for (const bool value : {is_there_ && cell_.slips(), is_there_, is_dropped_, is_crushed_}) {
+  for (const bool value : {is_there_ && cell_->slips(), is_there_, is_dropped_, is_crushed_}) {
     text += value ? ",1" : ",0";
   }
   return text;

@@ -21,10 +21,9 @@ bool is_disturbance(const std::string &name);
 class World {
 public:
   struct Options {
-    KindOfGrasp grasp;           // with the lift and the events
+    GraspScenario grasp;         // with the lift and the events
     bool lifts_by_itself = true; // once the force is steady; else by a command
     std::vector<Event> planned;
-    std::optional<Kind> kind; // whose course it is
   };
 
   // Both outlive it. From now on the object is between the fingers of motion.
@@ -39,14 +38,14 @@ public:
   bool disturb(Event event);
   void take_away() { is_there_ = false; }
 
-  Pressures pressures_Pa(std::size_t finger) const { return is_there_ ? face_.base_Pa(cell_.patch(finger)) : Pressures{}; }
+  Pressures pressures_Pa(std::size_t finger) const { return face_.base_Pa(patch(finger)); }
   // Without a force where nothing is touched.
-  Patch patch(std::size_t finger) const { return is_there_ ? cell_.patch(finger) : Patch{}; }
+  Patch patch(std::size_t finger) const { return is_there_ ? cell_->patch(finger) : Patch{}; }
 
   double time_s() const { return time_s_; }
   bool touched() const { return peak_N_ > TOUCHED_N; }
   bool is_dropped() const { return is_dropped_; }
-  double slid_mm() const { return cell_.slid_mm(); }
+  double slid_mm() const { return cell_->slid_mm(); }
   const std::vector<Slip> &slips() const { return slips_.slips; } // once it is dropped all, else those that have ended
   // The columns of the truth, in order.
   static const char *columns() {
@@ -65,10 +64,10 @@ private:
   void watch_object();
 
   Options options_;
-  KindOfGrasp grasp_; // and what was planned or commanded
+  GraspScenario grasp_; // and what was planned or commanded
   const Face &face_;
   GripperMotion &motion_;
-  Cell cell_;
+  std::unique_ptr<Cell> cell_;
   std::vector<std::string> events_;
   struct Steady {
     double since_s, force_N;

@@ -51,7 +51,7 @@ void GripperMotion::power_off() {
   blocked_ = 0;
 }
 
-void GripperMotion::move(const GripperMove &move) {
+void GripperMotion::move(const GripCommand &move) {
   const bool same = asked_ && asked_->width_mm == move.width_mm && asked_->speed_mm_s == move.speed_mm_s && asked_->force_N == move.force_N;
   if (active() && !same) {
     asked_ = move;
@@ -158,12 +158,8 @@ double GripperMotion::effort() const {
 }
 
 GripperStatus GripperMotion::status() const {
-  GripperStatus status;
-  status.active = active();
-  status.moving = moving();
-  status.object = status.moving ? std::nullopt : std::optional(blocked_ != 0);
-  status.width_mm = reported_width_mm();
-  return status;
+  const std::optional<bool> object = moving() ? std::nullopt : std::optional(blocked_ != 0);
+  return {.active = active(), .moving = moving(), .object = object, .width_mm = reported_width_mm()};
 }
 
 GripperLine::GripperLine(const GripperMechanics &mechanics, double width_mm, Random random)

@@ -1,14 +1,5 @@
 // How a simulated gripper's fingers move, in simulated time: no line, no clock, no chance.
 //
-//   GripperMotion motion(gripper_mechanics("ideal"));
-//   motion.blocked_at = [&](double width_mm, double force_N) { return ...; };
-//   motion.activate();
-//   motion.move({.width_mm = 20, .speed_mm_s = 50, .force_N = 20});
-//   for (...) {
-//     motion.step(0.0005);
-//     squeeze(motion.width_mm());
-//   }
-//
 // A command counts after the latency, and one that came later replaces it only after its own. Fingers run at constant speed to the nearest
 // step and stop at once; what accelerates is not modelled, and nothing but backlash lets an object push them apart: a 2F-85's screw holds,
 // a servo would yield. Latencies and the servo's backlash are assumptions, no measurements.
@@ -48,7 +39,7 @@ public:
   // Power is lost: the fingers stay, commands do nothing until activate.
   void power_off();
   // Ignored unless active, or if it repeats the last one; values beyond the traits' limits are clamped.
-  void move(const GripperMove &move);
+  void move(const GripCommand &move);
   // Stops after the latency where the fingers are then.
   void stop();
 
@@ -78,7 +69,7 @@ private:
   struct Command {
     double due_s;
     bool stop;
-    GripperMove move;
+    GripCommand move;
   };
 
   bool blocks(double width_mm, double force_N) const { return blocked_at && blocked_at(width_mm, force_N); }
@@ -91,7 +82,7 @@ private:
   GripperMechanics mechanics_;
   Phase phase_;
   std::deque<Command> commands_;     // not yet counting, in order
-  std::optional<GripperMove> asked_; // last
+  std::optional<GripCommand> asked_; // last
   double time_s_ = 0.0;
   double phase_began_s_ = 0.0;
   double drive_mm_, fingers_mm_;

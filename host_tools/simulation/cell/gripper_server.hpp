@@ -1,13 +1,6 @@
 // A simulated gripper on a port of its own, with its own protocol: Modbus RTU for Robotiq's, packets
 // for Feetech's. What its line can suffer is part of it.
 //
-//   GripperMotion motion(GripperServer::mechanics(model));
-//   GripperServer server(motion, {.model = model});
-//   puts(server.port().c_str());
-//   while (!stop) {
-//     server.step(1ms);
-//   }
-//
 // Answers come when the bytes of question and answer would have crossed the line, no sooner. One thread at a time.
 #pragma once
 

@@ -11,7 +11,7 @@
 
 namespace fingertip::cell {
 
-HandServer::HandServer(const Place &place, std::size_t fingertips, bool obeys)
+HandServer::HandServer(const PortFolder &place, std::size_t fingertips, bool obeys)
     : fingertips_(fingertips), obeys_(obeys), name_(place.port("hand")),
       lines_(place.port("truth"), {[this](int client, const std::string &line) {
                                      const std::string answer = obey(client, line);
@@ -65,9 +65,9 @@ bool HandServer::is_due(std::int64_t host_us) {
   return true;
 }
 
-void HandServer::send(std::size_t finger, std::int64_t device_us, const TrueTouch &truth) {
+void HandServer::send(std::size_t finger, std::int64_t device_us, const twin::Touch &truth) {
   std::string line = "truth " + std::string(SIDES[finger]) + " " + std::to_string(device_us);
-  for (const double value : {truth.x_mm, truth.y_mm, truth.force_N, truth.qx_N, truth.qy_N}) {
+  for (const double value : {truth.x_mm, truth.y_mm, truth.force_N, truth.pull_x_N, truth.pull_y_N}) {
     line += " " + fixed(value, 4);
   }
   lines_.send(line);

@@ -24,9 +24,6 @@ namespace fingertip::cell {
 struct HandAt {
   double x_mm = 0.0, y_mm = 0.0, force_N = 0.0;
 };
-struct TrueTouch : HandAt {
-  double qx_N = 0.0, qy_N = 0.0;
-};
 
 class HandServer {
 public:
@@ -34,7 +31,7 @@ public:
   static constexpr double MOST_N = 50.0, FARTHEST_mm = 100.0;
 
   // Throws Error: it cannot listen there.
-  HandServer(const Place &place, std::size_t fingertips, bool obeys);
+  HandServer(const PortFolder &place, std::size_t fingertips, bool obeys);
   ~HandServer();
   HandServer(const HandServer &) = delete;
   HandServer &operator=(const HandServer &) = delete;
@@ -45,7 +42,7 @@ public:
   const std::optional<HandAt> &hand(std::size_t finger) const { return hands_[finger].at; }
   // Whether the truth is due again. Host time.
   bool is_due(std::int64_t host_us);
-  void send(std::size_t finger, std::int64_t device_us, const TrueTouch &truth);
+  void send(std::size_t finger, std::int64_t device_us, const twin::Touch &truth);
 
 private:
   struct Held {

@@ -1,10 +1,8 @@
 #include "simulation/cell/kind_trial.hpp"
 
-#include "grasp/fingertip.hpp"
 #include "libfingertip/random.hpp"
 #include "library/pad/profile.hpp"
 #include "simulation/cell/cell.hpp"
-#include "simulation/cell/gripper_motion.hpp"
 #include "simulation/player/native_stages.h"
 #include "simulation/twin/effects.hpp"
 
@@ -41,13 +39,13 @@ std::uint64_t in_us(double s) { return static_cast<std::uint64_t>(std::llround(1
 // The reports of one fingertip: a pad with the errors of real ones, calibrated, and the firmware's own code.
 class Tip {
 public:
-  Tip(const KindTrial &trial, const Face &face, std::size_t finger)
+  Tip(const GraspTrial &trial, const Face &face, std::size_t finger)
       : kind_(trial.grasp.pads[finger]), face_(face), period_s_(1.0 / trial.rate_Hz), random_(trial.seed, TIP, finger),
         rubber_(twin::parse_effects("gain=8,memory,aftereffect"), SENSORS, LAYER_mm, AIR_Pa, random_.next()),
-        firmware_(nullptr, native_stages_free), base_Pa_(SENSORS), sensed_Pa_(SENSORS), next_s_(random_.uniform(0.0, period_s_)) {
+        firmware_(nullptr, native_stages_free), sensed_Pa_(SENSORS), next_s_(random_.uniform(0.0, period_s_)) {
     const pad_profile profile = pad::profile_over_own_sensors({LAYER_mm, 0.0, false});
-    Pressures gain{};
-    std::transform(rubber_.gain_errors().begin(), rubber_.gain_errors().end(), gain.begin(), [](double error) { return 1.0 + error; });
+    Pressures gain = rubber_.gain_errors();
+    std::for_each(gain.begin(), gain.end(), [](double &each) { each += 1.0; });
     const calibration stored = calibrated(gain, GAIN_SD, kind_.gain, profile, random_);
     firmware_.reset(native_stages_new(&stored, trial.estimates_load ? &profile : nullptr));
     for (double t_s = 0.0; t_s < STARTS_s; t_s += period_s_) {
@@ -68,9 +66,7 @@ public:
 
 private:
   wire_packet frame(double t_s, const Patch &patch) {
-    const Pressures base_Pa = face_.base_Pa(patch);
-    std::copy_n(base_Pa.begin(), SENSORS, base_Pa_.begin());
-    rubber_.report(t_s, base_Pa_, sensed_Pa_);
+    rubber_.report(t_s, face_.base_Pa(patch), sensed_Pa_);
     std::array<std::int32_t, FT_MAX_SENSORS> q10{};
     for (std::size_t k = 0; k < SENSORS; k++) {
       q10[k] = static_cast<std::int32_t>(std::lround(1024.0 * (AIR_Pa + sensed_Pa_[k] + NOISE_Pa * random_.normal())));
@@ -80,18 +76,18 @@ private:
     return packet;
   }
 
-  const KindOfPad &kind_;
+  const PadProperties &kind_;
   const Face &face_;
   double period_s_;
   Random random_;
   twin::Pad rubber_;
   std::unique_ptr<native_stages, void (*)(native_stages *)> firmware_;
-  std::vector<double> base_Pa_, sensed_Pa_;
+  Pressures sensed_Pa_;
   double next_s_, known_s_ = 0.0;
 };
 
 // How often a commanded width turns.
-struct Turns {
+struct Reversals {
   int count = 0, direction = 0;
   double mm = 0.0;
   void sample(double to_mm, bool counts) {
@@ -108,7 +104,7 @@ struct Turns {
 // A force that is to be held.
 class SetPoint {
 public:
-  explicit SetPoint(const KindTrial &trial) : trial_(trial) {}
+  explicit SetPoint(const GraspTrial &trial) : trial_(trial) {}
   void sample(double t_s, double sensed_N, double width_mm, double touched_s) {
     const double off = sensed_N / trial_.set_N - 1.0;
     if (!settle_s_) {
@@ -123,24 +119,24 @@ public:
     }
     turns_.sample(width_mm, t_s - touched_s >= 0.5 * trial_.still_s);
   }
-  void fill(KindOutcome &outcome) const {
+  void fill(TrialOutcome &outcome) const {
     outcome.settle_s = settle_s_;
     outcome.rms = samples_ > 0 ? std::sqrt(squares_ / samples_) : 0.0;
     outcome.reversals = turns_.count;
   }
 
 private:
-  const KindTrial &trial_;
+  const GraspTrial &trial_;
   double near_s_ = NEVER_s, squares_ = 0.0;
-  Turns turns_;
+  Reversals turns_;
   std::optional<double> settle_s_;
   int samples_ = 0;
 };
 
-class KindRun {
+class TrialRun {
 public:
-  KindRun(const KindTrial &trial, const Face &face, Controller &controller, const KindTrace &trace)
-      : trial_(trial), grasp_(trial.grasp), controller_(controller), trace_(trace), cell_(grasp_),
+  TrialRun(const GraspTrial &trial, const Face &face, Controller &controller, const TrialTrace &trace)
+      : trial_(trial), grasp_(trial.grasp), controller_(controller), trace_(trace), cell_(make_cell(grasp_)),
         gripper_(slowed(trial), trial.activates ? trial.gripper.traits.stroke_mm : grasp_.width_mm + grasp_.opens_mm,
                  Random(trial.seed, LINE, 0)),
         tips_{Tip(trial, face, 0), Tip(trial, face, 1)}, faults_(trial.fault.value_or(Fault()), Random(trial.seed, FAULT, 0)),
@@ -149,15 +145,15 @@ public:
       gripper_.motion().power_off();
     }
     gripper_.motion().blocked_at = [this](double width_mm, double force_N) {
-      return is_between_ && force_N > 0.0 && cell_.force_at_N(width_mm) >= force_N;
+      return is_between_ && force_N > 0.0 && cell_->force_at_N(width_mm) >= force_N;
     };
   }
 
-  KindOutcome go() {
+  TrialOutcome go() {
     while (!over_) {
       t_s_ += Cell::STEP_s;
       gripper_.motion().step(Cell::STEP_s);
-      cell_.run(Cell::STEP_s, is_between_ ? width_mm() : APART_mm, inputs());
+      cell_->run(Cell::STEP_s, is_between_ ? width_mm() : APART_mm, inputs());
       observe();
       deliver();
       if (t_s_ - stepped_s_ >= STEPS_s) {
@@ -175,7 +171,7 @@ public:
   }
 
 private:
-  static GripperMechanics slowed(const KindTrial &trial) {
+  static GripperMechanics slowed(const GraspTrial &trial) {
     GripperMechanics mechanics = trial.gripper;
     mechanics.traits.poll_s *= trial.grasp.poll_factor;
     return mechanics;
@@ -185,12 +181,12 @@ private:
   double width_mm() const { return gripper_.motion().width_mm(); }
 
   // Those of the grasp, and what the trial adds.
-  KindOfGrasp::Inputs inputs() {
-    KindOfGrasp::Inputs inputs = grasp_.inputs(since_lift_s());
+  GraspScenario::Inputs inputs() {
+    GraspScenario::Inputs inputs = grasp_.inputs(since_lift_s());
     if (trial_.slick_after_s && since_lift_s() >= *trial_.slick_after_s) {
       if (slick_s_ == NEVER_s) {
         slick_s_ = t_s_;
-        slick_share_ = std::min(1.0, SLICK_SHARE * least_N_ / std::max(cell_.mean_N(), LOST_N));
+        slick_share_ = std::min(1.0, SLICK_SHARE * least_N_ / std::max(cell_->mean_N(), LOST_N));
       }
       inputs.friction_share *= 1.0 - std::min(1.0, (t_s_ - slick_s_) / SLICK_s) * (1.0 - slick_share_);
     }
@@ -207,7 +203,7 @@ private:
       if (tip.next_s() > t_s_) {
         continue;
       }
-      const auto touch = faults_.frame(i, tip.measure(is_between_ ? cell_.patch(i) : Patch()));
+      const auto touch = faults_.frame(i, tip.measure(is_between_ ? cell_->patch(i) : Patch()));
       const bool gone = static_cast<int>(i) == grasp_.gone && lift_s_ < NEVER_s && since_lift_s() >= grasp_.gone_s;
       if (!tip.is_lost(grasp_.lost_share) && !gone && touch) {
         arrivals_.push_back(
@@ -276,11 +272,11 @@ private:
       over_ = t_s_ >= BEGINS_s;
       return;
     }
-    Failed &failed = outcome_.failed;
+    FaultOutcome &failed = outcome_.failed;
     if (!failed.begun) {
       failed.begun = true;
       began_mm_ = width_mm();
-      failed.before_N = cell_.mean_N();
+      failed.before_N = cell_->mean_N();
       if (is_between_) {
         lift_s_ = std::min(lift_s_, t_s_ + LIFTS_AFTER_s);
       }
@@ -291,7 +287,7 @@ private:
       }
       is_taken_ = is_taken_ || faults_.is(Fault::Kind::taken, t_s_);
     }
-    failed.after_N = std::max(failed.after_N, cell_.mean_N());
+    failed.after_N = std::max(failed.after_N, cell_->mean_N());
     is_taken_ = is_taken_ || outcome_.dropped;
     is_between_ = is_between_ && !is_taken_;
     if (is_between_) {
@@ -301,9 +297,9 @@ private:
   }
 
   void observe() {
-    const double since_s = since_lift_s(), force_N = cell_.mean_N();
+    const double since_s = since_lift_s(), force_N = cell_->mean_N();
     const bool lifts = since_s >= 0.0;
-    outcome_.peak_N = std::max({outcome_.peak_N, cell_.force_N(0), cell_.force_N(1)});
+    outcome_.peak_N = std::max({outcome_.peak_N, cell_->force_N(0), cell_->force_N(1)});
     touched_s_ = force_N > TOUCHED_N ? std::min(touched_s_, t_s_) : touched_s_;
     if (!is_between_ && !is_taken_) {
       is_between_ = gripper_.motion().active() && width_mm() > grasp_.width_mm + FREE_mm;
@@ -313,10 +309,10 @@ private:
       outcome_.never_held = t_s_ > PATIENCE_s && lift_s_ == NEVER_s && trial_.still_s == 0.0;
     } else {
       least_N_ = grasp_.least_N(since_s);
-      slips_.sample(since_s, cell_.slips(), force_N, cell_.slid_mm(), since_s >= grasp_.lift_s ? least_N_ : 0.0);
-      outcome_.turned_deg = std::max(outcome_.turned_deg, std::abs(cell_.turned_rad()) * 180.0 / M_PI);
-      const Vector way = cell_.way_mm();
-      outcome_.dropped = cell_.slid_mm() >= DROP_mm || std::hypot(way.x, way.y) >= DROP_mm;
+      slips_.sample(since_s, cell_->slips(), force_N, cell_->slid_mm(), since_s >= grasp_.lift_s ? least_N_ : 0.0);
+      outcome_.turned_deg = std::max(outcome_.turned_deg, std::abs(cell_->turned_rad()) * 180.0 / M_PI);
+      const Vector way = cell_->way_mm();
+      outcome_.dropped = cell_->slid_mm() >= DROP_mm || std::hypot(way.x, way.y) >= DROP_mm;
     }
     const bool waited = trial_.still_s > 0.0 && (t_s_ >= touched_s_ + trial_.still_s || t_s_ > trial_.still_s + PATIENCE_s);
     over_ = outcome_.dropped || outcome_.never_held || waited || (lifts && since_s >= grasp_.ends_s);
@@ -329,7 +325,7 @@ private:
     sample_s_ += SAMPLED_s;
     const double since_s = since_lift_s();
     if (since_s >= grasp_.lift_s) {
-      margins_.push_back(cell_.mean_N() / least_N_);
+      margins_.push_back(cell_->mean_N() / least_N_);
     }
     const double sent_mm = gripper_.sent().width_mm;
     if (trial_.still_s > 0.0 && touched_s_ < NEVER_s) {
@@ -338,24 +334,24 @@ private:
     }
     turns_.sample(sent_mm, since_s >= grasp_.steady_s);
     if (trace_) {
-      const Vector one = cell_.load_N(0), other = cell_.load_N(1);
+      const Vector one = cell_->load_N(0), other = cell_->load_N(1);
       trace_({{"t_s", t_s_},
               {"lift_s", std::max(since_s, -1.0)},
               {"width_mm", width_mm()},
-              {"force_N", cell_.mean_N()},
+              {"force_N", cell_->mean_N()},
               {"least_N", since_s >= 0.0 ? least_N_ : 0.0},
               {"load_N", 0.5 * (std::hypot(one.x, one.y) + std::hypot(other.x, other.y))},
-              {"way_mm", -cell_.way_mm().y},
-              {"slid_mm", cell_.slid_mm()},
-              {"slips", cell_.slips()},
+              {"way_mm", -cell_->way_mm().y},
+              {"slid_mm", cell_->slid_mm()},
+              {"slips", cell_->slips()},
               {"sensed_N", report_.force_N}});
     }
   }
 
-  KindOutcome outcome() {
+  TrialOutcome outcome() {
     outcome_.slides = report_.slides;
-    outcome_.friction = 2.0 * report_.friction / (cell_.friction(0) + cell_.friction(1));
-    outcome_.slid_mm = cell_.slid_mm();
+    outcome_.friction = 2.0 * report_.friction / (cell_->friction(0) + cell_->friction(1));
+    outcome_.slid_mm = cell_->slid_mm();
     outcome_.crushed = outcome_.peak_N > grasp_.crushes_N;
     outcome_.catches = slips_.slips;
     outcome_.hunts = !outcome_.dropped && turns_.count / (grasp_.ends_s - grasp_.steady_s) >= HUNTS_s;
@@ -370,11 +366,11 @@ private:
     return outcome_;
   }
 
-  const KindTrial &trial_;
-  const KindOfGrasp &grasp_;
+  const GraspTrial &trial_;
+  const GraspScenario &grasp_;
   Controller &controller_;
-  const KindTrace &trace_;
-  Cell cell_;
+  const TrialTrace &trace_;
+  std::unique_ptr<Cell> cell_;
   GripperLine gripper_;
   std::array<Tip, 2> tips_;
   struct Arrival { // of a touch or of the gripper's answer at the controller
@@ -386,20 +382,20 @@ private:
   SetPoint set_point_;
   GripCommand command_{};
   GripReport report_{};
-  KindOutcome outcome_;
+  TrialOutcome outcome_;
   Slips slips_;
   std::vector<double> margins_;
   bool over_ = false, is_between_, is_taken_ = false, has_asked_ = false;
   double t_s_ = 0.0, stepped_s_ = 0.0, sample_s_ = 0.0, answered_s_ = 0.0, touched_s_ = NEVER_s;
   double held_s_ = NEVER_s, lift_s_ = NEVER_s, slick_s_ = NEVER_s, slick_share_ = 1.0;
   double least_N_ = 0.0, began_mm_ = 0.0;
-  Turns turns_;
+  Reversals turns_;
 };
 
 } // namespace
 
-KindOutcome run_kind(const KindTrial &trial, const Face &face, Controller &controller, const KindTrace &trace) {
-  return KindRun(trial, face, controller, trace).go();
+TrialOutcome run_trial(const GraspTrial &trial, const Face &face, Controller &controller, const TrialTrace &trace) {
+  return TrialRun(trial, face, controller, trace).go();
 }
 
 } // namespace fingertip::cell

@@ -19,7 +19,6 @@
 
 namespace fingertip::cell {
 
-// What decides in a trial.
 class Controller {
 public:
   virtual ~Controller() = default;
@@ -42,8 +41,8 @@ private:
   Grip core_;
 };
 
-struct KindTrial {
-  KindOfGrasp grasp;
+struct GraspTrial {
+  GraspScenario grasp;
   GripperMechanics gripper;
   std::uint64_t seed = 0;
   double later_s = 0.0;       // additional delay of all frames
@@ -68,7 +67,7 @@ struct KindTrial {
 };
 
 // Since a fault began.
-struct Failed {
+struct FaultOutcome {
   bool begun = false;
   double before_N = 0.0, after_N = 0.0; // the grip when it began, the largest since
   double opened_mm = 0.0;               // the fingers wider than when it began, at most, with the object between them
@@ -78,7 +77,7 @@ struct Failed {
   std::optional<double> released_s = {}; // since the lift began, when it was going to open
 };
 
-struct KindOutcome {
+struct TrialOutcome {
   bool dropped = false, never_held = false, crushed = false, hunts = false;
   double slid_mm = 0.0, peak_N = 0.0;
   double first_N = 0.0;      // the largest force before the lift
@@ -91,13 +90,13 @@ struct KindOutcome {
   std::optional<double> settle_s; // from the touch until the force stays within 10 % for 0.5 s
   double rms = 0.0;               // of the error from there on, share of the set force
   int reversals = 0;              // of the commanded width over the last half of the time
-  Failed failed;
+  FaultOutcome failed;
 };
 
 // What is true at a time, by name; lift_s: since the lift began, -1 before it.
-using KindTrace = std::function<void(const std::vector<std::pair<const char *, double>> &moment)>;
+using TrialTrace = std::function<void(const std::vector<std::pair<const char *, double>> &moment)>;
 
 // trace: called every 2 ms.
-KindOutcome run_kind(const KindTrial &trial, const Face &face, Controller &controller, const KindTrace &trace = {});
+TrialOutcome run_trial(const GraspTrial &trial, const Face &face, Controller &controller, const TrialTrace &trace = {});
 
 } // namespace fingertip::cell

@@ -60,6 +60,8 @@ struct Stiffer {
 constexpr Stiffer STIFFER[] = {{"ball", 1.0, 1.0, 1.0},    {"egg", 1.0, 1.0, 1.0},   {"box", 8.0, 0.3, 3.0}, {"plate", 8.0, 0.3, 3.0},
                                {"upright", 3.0, 0.6, 2.0}, {"lying", 3.0, 0.6, 2.0}, {"cup", 3.0, 0.6, 2.0}};
 
+// No grasp needs more than this at its worst, by kinetic friction.
+constexpr double NEEDS_MOST_N = 16.0;
 // Acceleration of the minimum-jerk way of unit length and time is at most this.
 constexpr double EASED_ACCELERATION = 5.7735;
 
@@ -90,7 +92,7 @@ Event draw_event(Random &random, std::size_t of, double begin_s, bool calm) {
 }
 
 // Shape and size, and what they do to the pads.
-void draw_shape(Random &random, std::size_t of, KindOfGrasp &grasp) {
+void draw_shape(Random &random, std::size_t of, GraspScenario &grasp) {
   if (grasp.kind != Kind::fragile) {
     grasp.shape = DRAWN[random.next() % DRAWN.size()];
   }
@@ -103,9 +105,9 @@ void draw_shape(Random &random, std::size_t of, KindOfGrasp &grasp) {
   stiffen(grasp);
 }
 
-KindOfGrasp draw_once(Random &random, Kind kind) {
+GraspScenario draw_once(Random &random, Kind kind) {
   const auto of = static_cast<std::size_t>(kind);
-  KindOfGrasp grasp{};
+  GraspScenario grasp{};
   grasp.kind = kind;
   grasp.mass_kg = ALL.mass_kg[of].low > 0.0 ? random.log_uniform(ALL.mass_kg[of].low, ALL.mass_kg[of].high) : 0.0;
   if (kind == Kind::fragile) {
@@ -170,23 +172,20 @@ const char *name_of(Kind kind) {
 
 const char *name_of(Shape shape) { return STIFFER[static_cast<int>(shape)].name; }
 
-template <typename All> static auto one_of(const All &all, const char *what, const std::string &name) {
-  if (const auto *found = find_in(all, [&](auto one) { return name == name_of(one); })) {
+Kind kind_of(const std::string &name) {
+  if (const Kind *found = find_in(KINDS, [&](Kind kind) { return name == name_of(kind); })) {
     return *found;
   }
-  const auto text_of = [](auto one) { return name_of(one); };
-  throw std::runtime_error(std::string("there is no ") + what + " \"" + name + "\"; choose one of: " + joined(all, " ", text_of));
+  throw std::runtime_error("there is no kind \"" + name +
+                           "\"; choose one of: " + joined(KINDS, " ", [](Kind kind) { return name_of(kind); }));
 }
-
-Shape shape_of(const std::string &name) { return one_of(SHAPES, "shape", name); }
-Kind kind_of(const std::string &name) { return one_of(KINDS, "kind", name); }
 
 const char *name_of(Event::Kind kind) {
   constexpr const char *NAMES[] = {"knock", "push", "vibrate", "pour", "carry", "slick", "lower"};
   return NAMES[static_cast<int>(kind)];
 }
 
-KindOfGrasp::Inputs KindOfGrasp::inputs(double t_s) const {
+GraspScenario::Inputs GraspScenario::inputs(double t_s) const {
   Inputs inputs;
   inputs.mass_kg = mass_kg;
   inputs.lifted_mm = lift_mm * way_of(t_s / lift_s);
@@ -219,26 +218,26 @@ KindOfGrasp::Inputs KindOfGrasp::inputs(double t_s) const {
   return inputs;
 }
 
-double KindOfGrasp::least_N(double t_s) const {
+double GraspScenario::least_N(double t_s) const {
   const Inputs now = inputs(t_s);
   const double x_N = now.push_N.x - now.mass_kg * now.hand_m_s2.x;
   const double y_N = now.push_N.y - now.mass_kg * (GRAVITY_m_s2 + now.hand_m_s2.y);
   return std::hypot(x_N, y_N) / (now.friction_share * (pads[0].friction + pads[1].friction));
 }
 
-void stiffen(KindOfGrasp &grasp) {
+void stiffen(GraspScenario &grasp) {
   const Stiffer &stiffer = STIFFER[static_cast<int>(grasp.shape)];
-  for (KindOfPad &pad : grasp.pads) {
+  for (PadProperties &pad : grasp.pads) {
     pad.at_1_mm_N *= stiffer.times;
   }
   grasp.exponent = 1.0 + stiffer.of_exponent * (grasp.exponent - 1.0);
   grasp.shear_N_mm *= stiffer.shear;
 }
 
-KindOfGrasp draw_grasp(Kind kind, std::uint64_t seed, std::uint64_t n) {
+GraspScenario draw_grasp(Kind kind, std::uint64_t seed, std::uint64_t n) {
   Random random(seed, KIND + static_cast<std::uint64_t>(kind), n);
   for (;;) {
-    KindOfGrasp grasp = draw_once(random, kind);
+    GraspScenario grasp = draw_once(random, kind);
     double worst_N = 0.0;
     for (double t_s = 0.0; t_s < grasp.steady_s; t_s += 0.01) {
       worst_N = std::max(worst_N, grasp.least_N(t_s) / grasp.kinetic_share);

@@ -1,13 +1,13 @@
 // Grasps as they differ from each other: rubber, object, lift, what happens then, and the line.
 //
-// All of it is drawn from ranges. A kind is a set of ranges; kinds.cpp has them. The n-th grasp of
-// a kind and seed is always the same. host_tools/grasp/control/CONTROL.md has the table of kinds.
+// A kind is a set of ranges (kinds.cpp; CONTROL.md has a table). The n-th grasp of a kind and seed is always the same.
 #pragma once
 
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,8 +31,6 @@ enum class Shape {
 };
 constexpr std::array<Shape, 7> SHAPES = {Shape::ball, Shape::egg, Shape::box, Shape::plate, Shape::upright, Shape::lying, Shape::cup};
 const char *name_of(Shape shape);
-// Throws std::runtime_error: there is none.
-Shape shape_of(const std::string &name);
 
 enum class Kind { gentle, usual, rough, slick, fragile };
 constexpr std::array<Kind, 5> KINDS = {Kind::gentle, Kind::usual, Kind::rough, Kind::slick, Kind::fragile};
@@ -58,7 +56,7 @@ struct Event {
 };
 const char *name_of(Event::Kind kind);
 
-struct KindOfPad {
+struct PadProperties {
   double at_1_mm_N = 3.0;    // force at 1 mm of indentation
   double relaxation = 0.175; // share of the force lost in 8 s; real pads: 0.04 to 0.14
   double friction = 0.5;     // static
@@ -66,15 +64,15 @@ struct KindOfPad {
   double delay_s = 0.0;      // of its frames, beyond the conversion, the processing and the line
 };
 
-struct KindOfGrasp {
-  Kind kind = Kind::gentle;
-  std::string object; // of kind fragile
+struct GraspScenario {
+  std::optional<Kind> kind; // none: it was not drawn
+  std::string object;       // of kind fragile
   Shape shape = Shape::ball;
   double height_mm = 40.0, depth_mm = 40.0; // of box, plate and egg; of a cylinder its length
   Vector com_mm;                            // centre of mass from the middle
   Vector place_mm;                          // of the middle on fingertip 0, in its own x and y
   double down_rad = -M_PI_2;                // gravity there, from x towards y
-  std::array<KindOfPad, 2> pads;
+  std::array<PadProperties, 2> pads;
   double exponent = 1.6;                                           // of force over indentation
   double shear_N_mm = 3.5;                                         // tangential stiffness of a pad at 4 N
   double rubber_N_s_mm = 0.008;                                    // damping of it, with the loss at the contact's edge
@@ -109,11 +107,8 @@ struct KindOfGrasp {
 };
 
 // The pads' stiffness and exponent under another shape than a ball: lines and areas are stiffer.
-void stiffen(KindOfGrasp &grasp);
+void stiffen(GraspScenario &grasp);
 
-// No grasp needs more than this at its worst, by kinetic friction.
-constexpr double NEEDS_MOST_N = 16.0;
-
-KindOfGrasp draw_grasp(Kind kind, std::uint64_t seed, std::uint64_t n);
+GraspScenario draw_grasp(Kind kind, std::uint64_t seed, std::uint64_t n);
 
 } // namespace fingertip::cell

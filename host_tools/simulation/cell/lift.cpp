@@ -28,16 +28,12 @@ public:
   std::vector<std::string> take() {
     pollfd input = {STDIN_FILENO, POLLIN, 0};
     const bool is_ours = !isatty(STDIN_FILENO) || tcgetpgrp(STDIN_FILENO) == getpgrp();
-    if (ended_ || !is_ours || wait_for(&input, 1, HostTime()) <= 0) {
+    if (!is_ours || wait_for(&input, 1, HostTime()) <= 0) {
       return {};
     }
     char bytes[1024];
     const ssize_t count = read(STDIN_FILENO, bytes, sizeof bytes);
-    if (count <= 0) {
-      ended_ = true;
-      return {};
-    }
-    came_.append(bytes, static_cast<std::size_t>(count));
+    came_.append(bytes, static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
     std::vector<std::string> lines;
     for (std::size_t end; (end = came_.find('\n')) != std::string::npos;) {
       lines.push_back(came_.substr(0, end));
@@ -48,13 +44,12 @@ public:
 
 private:
   std::string came_;
-  bool ended_ = false;
 };
 
 class Lift {
 public:
-  Lift(const LiftOptions &options, const Place &place)
-      : options_(options), place_(place), face_(LIFT_FACE, LAYER_mm, options.cache),
+  Lift(const SimulationOptions &options, const PortFolder &place)
+      : options_(options), place_(place), face_(LIFT_FACE, options.cache),
         fingers_(place, place.fingers(FINGERS, options.seed, options.gain_spread.value_or(0.05), false, GAIN_ERROR)),
         motion_(GripperServer::mechanics(options.model), options.world.grasp.width_mm + options.world.grasp.opens_mm),
         server_(motion_, {.model = options.model, .link = place.port("gripper"), .real_time = false}) {
@@ -85,10 +80,10 @@ public:
 
 private:
   std::string head() const {
-    const KindOfGrasp &grasp = options_.world.grasp;
+    const GraspScenario &grasp = options_.world.grasp;
     std::ostringstream text;
     text << "# simulated: the truth of a cell; time_us is CLOCK_MONOTONIC\n# gripper: " << options_.model << "\n# face: " << LIFT_FACE
-         << "\n# kind: " << (options_.world.kind ? name_of(*options_.world.kind) : "none") << "\n# shape: " << name_of(grasp.shape)
+         << "\n# kind: " << (grasp.kind ? name_of(*grasp.kind) : "none") << "\n# shape: " << name_of(grasp.shape)
          << "\n# width_mm: " << grasp.width_mm << "\n# mass_kg: " << grasp.mass_kg << "\n# friction: " << grasp.pads[0].friction << ", "
          << grasp.pads[1].friction << "\n# crushes_N: " << grasp.crushes_N << "\n# seed: " << options_.seed << "\n";
     return text.str();
@@ -101,7 +96,7 @@ private:
     const std::int64_t heard_us = std::chrono::duration_cast<std::chrono::microseconds>(server_.heard_at().time_since_epoch()).count();
     bool is_late_one = is_late(heard_us);
     for (std::size_t i = 0; i < FINGERS; i++) {
-      is_late_one = is_late_one || (fingers_.is_there(i) && !fingers_.is_frozen(i) && is_late(fingers_.reached_us(i)));
+      is_late_one = is_late_one || (fingers_.is_there(i) && !fingers_.shared(i).frozen && is_late(fingers_.shared(i).reached_us));
     }
     return is_late_one;
   }
@@ -133,7 +128,7 @@ private:
       std::printf("%s\n", answer.c_str());
       std::fflush(stdout);
     }
-    fingers_.look();
+    fingers_.check();
   }
 
   void send_truth(std::int64_t now_us) {
@@ -143,8 +138,7 @@ private:
     server_of_truth_->step();
     if (server_of_truth_->is_due(now_us)) {
       for (std::size_t i = 0; i < FINGERS; i++) {
-        const twin::Touch touch = world_->patch(i);
-        server_of_truth_->send(i, fingers_.device_us(i, now_us), {{touch.x_mm, touch.y_mm, touch.force_N}, touch.pull_x_N, touch.pull_y_N});
+        server_of_truth_->send(i, fingers_.device_us(i, now_us), world_->patch(i));
       }
     }
   }
@@ -166,7 +160,7 @@ private:
       at_touch_ = command.substr(command.find(what));
       return "ok";
     }
-    if (!(verb.empty() ? false : act(verb, what))) {
+    if (!act(verb, what)) {
       throw Error(ErrorCode::bad_value, "\"" + printable(command) + "\" cannot be; " + COMMANDS);
     }
     if (verb != "lift" && !is_disturbance(verb)) { // the world reports those itself
@@ -194,7 +188,7 @@ private:
     } else if (verb == "kill" && is_finger) {
       fingers_.end(finger);
     } else if ((verb == "freeze" || verb == "thaw") && is_finger) {
-      fingers_.freeze(finger, verb == "freeze");
+      fingers_.shared(finger).frozen = verb == "freeze";
     } else if (verb == "power" && (what == "on" || what == "off")) {
       server_.power(what == "on");
     } else if (verb == "fault" && is_positive && *number <= 255.0) {
@@ -216,10 +210,10 @@ private:
                                           "left|right, line none|silent|garbage|damaged|other_slave|refused, late MS, latency_timer "
                                           "MS, power on|off, fault CODE, at_touch COMMAND; COMMAND..., truth, or quit";
 
-  const LiftOptions &options_;
-  const Place &place_;
+  const SimulationOptions &options_;
+  const PortFolder &place_;
   Face face_;
-  Fingers fingers_; // processes, before there are threads
+  FingertipProcesses fingers_; // processes, before there are threads
   GripperMotion motion_;
   GripperServer server_;
   std::optional<World> world_;
@@ -234,23 +228,14 @@ private:
 
 } // namespace
 
-void be_of_kind(LiftOptions &options, Kind kind) {
-  KindOfGrasp grasp = draw_grasp(kind, options.seed, 0);
-  grasp.stiffness_N_mm = options.world.grasp.stiffness_N_mm;
-  grasp.down_rad = options.world.grasp.down_rad;
-  options.world.grasp = grasp;
-  options.world.kind = kind;
-}
-
-void check(const LiftOptions &options) {
+void lift(const SimulationOptions &options, const PortFolder &place) {
   const GripperTraits &traits = gripper_traits(options.model);
   const double widest_mm = options.world.grasp.width_mm + options.world.grasp.opens_mm;
   if (widest_mm > traits.stroke_mm) {
     throw Error(ErrorCode::bad_value,
                 options.model + " opens to " + fixed(traits.stroke_mm, 1) + " mm; the object and --opens take " + fixed(widest_mm, 1));
   }
+  Lift(options, place).run();
 }
-
-void lift(const LiftOptions &options, const Place &place) { Lift(options, place).run(); }
 
 } // namespace fingertip::cell

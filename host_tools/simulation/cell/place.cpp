@@ -26,12 +26,12 @@ namespace fs = std::filesystem;
 
 constexpr const char *SERIALS[SIDES.size()] = {"00000000000CE110", "00000000000CE111"};
 enum Stream : std::uint64_t { GAINS = 851 };
-constexpr std::chrono::milliseconds LOOK_INTERVAL{10};
+constexpr std::chrono::milliseconds CHECK_INTERVAL{10};
 constexpr std::int64_t ROW_us = 2'000;
 
 volatile std::sig_atomic_t interrupted = 0;
 
-Place::Place(const std::string &folder) : folder_(folder.empty() ? simulated_folder() : folder), is_shared_(folder.empty()) {
+PortFolder::PortFolder(const std::string &folder) : folder_(folder.empty() ? simulated_folder() : folder), is_shared_(folder.empty()) {
   std::error_code error;
   if (is_shared_) {
     make_own_folder(own_share_folder());
@@ -49,30 +49,31 @@ Place::Place(const std::string &folder) : folder_(folder.empty() ? simulated_fol
   }
 }
 
-Place::~Place() {
+PortFolder::~PortFolder() {
   unlink((folder_ + "/lock").c_str());
   close(lock_);
 }
 
-std::vector<FingerProcess> Place::fingers(std::size_t count, std::uint64_t seed, double gain_sd, bool parallel_bus,
-                                          std::optional<double> calibrated_sd) const {
+std::vector<FingerProcess> PortFolder::fingers(std::size_t count, std::uint64_t seed, double gain_sd, bool parallel_bus,
+                                               std::optional<double> calibrated_sd) const {
   std::vector<FingerProcess> fingers;
   for (std::size_t i = 0; i < count; i++) {
     FingerProcess &finger = fingers.emplace_back(FingerProcess{SERIALS[i], port(SIDES[i]), 2 * seed + i, {}, calibrated_sd, parallel_bus});
     Random random(finger.seed, GAINS, 0);
     for (std::size_t k = 0; k < SENSORS; k++) {
-      finger.gain[k] = 1.0 + std::clamp(gain_sd * random.normal(), -0.5, 0.5);
+      finger.gain.push_back(1.0 + std::clamp(gain_sd * random.normal(), -0.5, 0.5));
     }
   }
   return fingers;
 }
 
-void Place::print_ready(std::size_t fingers, const std::string &more) const {
+void PortFolder::print_ready(std::size_t fingers, const std::string &more) const {
   std::printf("ready: %s%s%s\n", port(SIDES[0]).c_str(), fingers > 1 ? (", " + port(SIDES[1])).c_str() : "", more.c_str());
   std::fflush(stdout);
 }
 
-Fingers::Fingers(const Place &place, const std::vector<FingerProcess> &fingers) : fingers_(fingers), processes_(fingers.size()) {
+FingertipProcesses::FingertipProcesses(const PortFolder &place, const std::vector<FingerProcess> &fingers)
+    : fingers_(fingers), processes_(fingers.size()) {
   if (place.is_shared()) {
     server_.emplace(Server::Options{own_share_folder(), {}}, [](const std::string &line) {
       if (line.find(": shared as ") == std::string::npos) {
@@ -90,7 +91,7 @@ Fingers::Fingers(const Place &place, const std::vector<FingerProcess> &fingers) 
   }
 }
 
-Fingers::~Fingers() {
+FingertipProcesses::~FingertipProcesses() {
   server_.reset();
   for (std::size_t i = 0; i < count(); i++) {
     end(i);
@@ -98,18 +99,18 @@ Fingers::~Fingers() {
   munmap(shared_, count() * sizeof(SharedPressures));
 }
 
-void Fingers::wait_until_ready() {
+void FingertipProcesses::wait_until_ready() {
   const auto goes_on = [&] {
-    put(steady_now_us(), std::vector<Pressures>(count()));
-    look();
+    put(steady_now_us(), std::vector<Pressures>(count(), Pressures(SENSORS)));
+    check();
     if (interrupted) {
       throw Error("interrupted");
     }
   };
   for (std::size_t i = 0; i < count(); i++) {
-    while (reached_us(i) == 0) {
+    while (shared_[i].reached_us == 0) {
       goes_on();
-      wait_until(host_now() + LOOK_INTERVAL);
+      wait_until(host_now() + CHECK_INTERVAL);
     }
   }
   for (std::size_t i = 0; server_ && i < count(); i++) {
@@ -117,12 +118,12 @@ void Fingers::wait_until_ready() {
     const std::string socket = own_share_folder() + "/" + share_socket_name(fingers_[i].serial);
     while (!SocketTransport::is_served(socket)) { // a killed simulation may have left one
       goes_on();
-      server_->step(LOOK_INTERVAL);
+      server_->step(CHECK_INTERVAL);
     }
   }
 }
 
-void Fingers::share(std::chrono::milliseconds longest_wait) {
+void FingertipProcesses::share(std::chrono::milliseconds longest_wait) {
   if (server_) {
     server_->step(longest_wait);
   } else if (longest_wait.count() > 0) {
@@ -130,7 +131,7 @@ void Fingers::share(std::chrono::milliseconds longest_wait) {
   }
 }
 
-void Fingers::end(std::size_t finger) {
+void FingertipProcesses::end(std::size_t finger) {
   if (is_there(finger)) {
     kill(processes_[finger], SIGKILL);
     waitpid(processes_[finger], nullptr, 0);
@@ -138,7 +139,7 @@ void Fingers::end(std::size_t finger) {
   }
 }
 
-void Fingers::look() {
+void FingertipProcesses::check() {
   for (std::size_t i = 0; i < count(); i++) {
     if (is_there(i) && waitpid(processes_[i], nullptr, WNOHANG) != 0) {
       forget(i);
@@ -147,7 +148,7 @@ void Fingers::look() {
   }
 }
 
-void Fingers::forget(std::size_t finger) {
+void FingertipProcesses::forget(std::size_t finger) {
   processes_[finger] = 0;
   std::error_code none;
   fs::remove(fingers_[finger].link, none);

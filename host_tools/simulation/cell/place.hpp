@@ -19,23 +19,15 @@ constexpr std::array<const char *, 2> SIDES = {"left", "right"};
 // Signals that end a simulation set it.
 extern volatile std::sig_atomic_t interrupted;
 
-// Of every simulation.
-struct SimulationOptions {
-  std::string truth, cache;
-  std::optional<double> seconds, gain_spread; // gain_spread: standard deviation; none: the simulation's usual one
-  std::uint64_t seed = 1;
-  bool overwrite = false;
-};
-
 // The ports' folder, for one simulation at a time.
-class Place {
+class PortFolder {
 public:
   // folder empty: that of simulated ports (discovery.hpp), and fingertips are shared with every
   // program as by `fingertip serve`. Throws Error: another simulation is there.
-  explicit Place(const std::string &folder);
-  ~Place();
-  Place(const Place &) = delete;
-  Place &operator=(const Place &) = delete;
+  explicit PortFolder(const std::string &folder);
+  ~PortFolder();
+  PortFolder(const PortFolder &) = delete;
+  PortFolder &operator=(const PortFolder &) = delete;
 
   bool is_shared() const { return is_shared_; }
   std::string port(const std::string &name) const { return folder_ + "/" + name; }
@@ -51,14 +43,13 @@ private:
   int lock_ = -1;
 };
 
-// Their processes.
-class Fingers {
+class FingertipProcesses {
 public:
   // Before there are threads. Throws Error.
-  Fingers(const Place &place, const std::vector<FingerProcess> &fingers);
-  ~Fingers();
-  Fingers(const Fingers &) = delete;
-  Fingers &operator=(const Fingers &) = delete;
+  FingertipProcesses(const PortFolder &place, const std::vector<FingerProcess> &fingers);
+  ~FingertipProcesses();
+  FingertipProcesses(const FingertipProcesses &) = delete;
+  FingertipProcesses &operator=(const FingertipProcesses &) = delete;
 
   // Once they know their zeros, and are shared where they are to be. Throws Error: one cannot start, or a signal came.
   void wait_until_ready();
@@ -72,16 +63,14 @@ public:
   void share(std::chrono::milliseconds longest_wait);
 
   std::size_t count() const { return fingers_.size(); }
-  std::uint32_t rates_set(std::size_t finger) const { return shared_[finger].rates_set; }
-  std::int64_t reached_us(std::size_t finger) const { return shared_[finger].reached_us; }
+  // What is shared with its process, while it is there.
+  SharedPressures &shared(std::size_t finger) const { return shared_[finger]; }
   // In the fingertip's own time.
   std::int64_t device_us(std::size_t finger, std::int64_t host_us) const { return host_us - shared_[finger].zero_us; }
   bool is_there(std::size_t finger) const { return processes_[finger] > 0; }
-  bool is_frozen(std::size_t finger) const { return shared_[finger].frozen; }
-  void freeze(std::size_t finger, bool frozen) { shared_[finger].frozen = frozen; }
   void end(std::size_t finger);
   // Throws Error: one has ended by itself.
-  void look();
+  void check();
 
 private:
   void forget(std::size_t finger);

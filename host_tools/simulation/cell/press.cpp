@@ -39,9 +39,9 @@ double spread(std::uint64_t number, unsigned base) {
 // One fingertip's weight and rubber.
 class Pressed {
 public:
-  Pressed(const Face &face, const PressOptions &options, std::uint64_t seed)
+  Pressed(const Face &face, const SimulationOptions &options, std::uint64_t seed)
       : face_(face), weight_N_(1e-3 * options.weight_g * GRAVITY_m_s2),
-        rubber_(twin::parse_effects("memory,aftereffect"), SENSORS, LAYER_mm, AIR_Pa, seed), base_Pa_(SENSORS), sensed_Pa_(SENSORS) {
+        rubber_(twin::parse_effects("memory,aftereffect"), SENSORS, LAYER_mm, AIR_Pa, seed), sensed_Pa_(SENSORS) {
     Random random(seed, PLACES, 0);
     begin_x_ = random.uniform(0.0, 1.0);
     begin_y_ = random.uniform(0.0, 1.0);
@@ -56,7 +56,7 @@ public:
     touch_.x_mm = twin::outermost_mm(geometry.x_mm) * (2.0 * std::fmod(begin_x_ + spread(place, 2), 1.0) - 1.0);
     touch_.y_mm = twin::outermost_mm(geometry.y_mm) * (2.0 * std::fmod(begin_y_ + spread(place, 3), 1.0) - 1.0);
     touch_.force_N = weight_N_ * (smooth(since_s / SETS_DOWN_s) - smooth((since_s - SETS_DOWN_s - HOLDS_s) / SETS_DOWN_s));
-    feel(time_s);
+    sense(time_s);
   }
   // Follows the hand instead.
   void follow(double time_s, const std::optional<HandAt> &hand) {
@@ -71,14 +71,10 @@ public:
     if (!hand && touch_.force_N < LIFTED_N) {
       touch_.force_N = 0.0;
     }
-    feel(time_s);
+    sense(time_s);
   }
-  TrueTouch truth() const { return {{touch_.x_mm, touch_.y_mm, touch_.force_N}}; }
-  Pressures pressures_Pa() const {
-    Pressures pressures{};
-    std::copy(sensed_Pa_.begin(), sensed_Pa_.end(), pressures.begin());
-    return pressures;
-  }
+  const Patch &touch() const { return touch_; }
+  const Pressures &pressures_Pa() const { return sensed_Pa_; }
   // x_mm, y_mm, force_N; places only while it touches.
   std::string cells() const {
     const std::array values = {touch_.x_mm, touch_.y_mm, touch_.force_N};
@@ -86,21 +82,17 @@ public:
   }
 
 private:
-  void feel(double time_s) {
-    const Pressures pressures = touch_.force_N > 0.0 ? face_.base_Pa(touch_) : Pressures{};
-    std::copy_n(pressures.begin(), SENSORS, base_Pa_.begin());
-    rubber_.report(time_s, base_Pa_, sensed_Pa_);
-  }
+  void sense(double time_s) { rubber_.report(time_s, face_.base_Pa(touch_), sensed_Pa_); }
 
   const Face &face_;
   double weight_N_, followed_s_ = 0.0;
   twin::Pad rubber_;
   double begin_x_, begin_y_; // of both sequences
   Patch touch_;
-  std::vector<double> base_Pa_, sensed_Pa_; // [sensor]
+  Pressures sensed_Pa_;
 };
 
-std::string head_of(const PressOptions &options, const std::vector<FingerProcess> &fingers) {
+std::string head_of(const SimulationOptions &options, const std::vector<FingerProcess> &fingers) {
   std::ostringstream text;
   text << "# simulated: the truth of presses; time_us is CLOCK_MONOTONIC\n# weight_g: " << options.weight_g << "\n# seed: " << options.seed;
   std::string columns = "\ntime_us";
@@ -118,7 +110,8 @@ std::string head_of(const PressOptions &options, const std::vector<FingerProcess
 }
 
 // What each round gives, of a host's time and of the time since it began, goes to the fingertips.
-template <typename Round> void run(Fingers &fingers, std::optional<double> seconds, std::chrono::milliseconds every, Round round) {
+template <typename Round>
+void run(FingertipProcesses &fingers, std::optional<double> seconds, std::chrono::milliseconds every, Round round) {
   const std::int64_t began_us = steady_now_us();
   std::int64_t last_us = 0;
   double time_s = 0.0;
@@ -129,17 +122,17 @@ template <typename Round> void run(Fingers &fingers, std::optional<double> secon
     if (now_us - last_us >= 1000 * every.count()) {
       last_us = now_us;
       fingers.put(now_us, round(now_us, time_s));
-      fingers.look();
+      fingers.check();
     }
   }
 }
 
 } // namespace
 
-void press(const PressOptions &options, const Place &place) {
-  const Face face(PRESS_FACE, LAYER_mm, options.cache);
+void press(const SimulationOptions &options, const PortFolder &place) {
+  const Face face(PRESS_FACE, options.cache);
   const auto processes = place.fingers(options.fingertips, options.seed, options.gain_spread.value_or(0.1), true);
-  Fingers fingers(place, processes);
+  FingertipProcesses fingers(place, processes);
   Truth truth(options.truth, options.overwrite, head_of(options, processes));
   std::vector<Pressed> pressed;
   for (std::size_t i = 0; i < fingers.count(); i++) {
@@ -167,7 +160,7 @@ void press(const PressOptions &options, const Place &place) {
       pressures.push_back(one.pressures_Pa());
       cells += (cells.empty() ? "" : ",") + one.cells();
       if (sends) {
-        hands->send(i, fingers.device_us(i, now_us), one.truth());
+        hands->send(i, fingers.device_us(i, now_us), one.touch());
       }
     }
     truth.row(now_us, cells);
@@ -175,30 +168,30 @@ void press(const PressOptions &options, const Place &place) {
   });
 }
 
-void validate(const ValidatedOptions &options, std::optional<double> seconds, const Place &place) {
+void validate(const ValidatedOptions &options, std::optional<double> seconds, const PortFolder &place) {
   std::optional<ValidatedPad> pad(std::in_place, options);
   std::vector<FingerProcess> processes = place.fingers(1, options.seed, 0.0, true); // the pad has its own gains
   processes[0].round = VALIDATED_ROUND;
-  Fingers fingers(place, processes);
+  FingertipProcesses fingers(place, processes);
   fingers.wait_until_ready();
   place.print_ready(1);
-  std::uint32_t rates_set = fingers.rates_set(0);
+  std::uint32_t rates_set = fingers.shared(0).rates_set;
   bool goes = false;
   double began_s = 0.0;
   run(fingers, seconds, VALIDATED_ROUND, [&](std::int64_t, double now_s) {
-    if (!goes && fingers.rates_set(0) != rates_set) {
+    if (!goes && fingers.shared(0).rates_set != rates_set) {
       goes = true;
       began_s = now_s;
       pad.emplace(options);
     }
-    Pressures pressures{};
+    Pressures pressures(SENSORS);
     if (goes) {
       for (std::size_t k = 0; k < SENSORS; k++) {
         pressures[k] = pad->pressure_Pa(k, now_s - began_s);
       }
       if (now_s - began_s >= pad->end_s()) {
         goes = false;
-        rates_set = fingers.rates_set(0);
+        rates_set = fingers.shared(0).rates_set;
       }
     }
     return std::vector<Pressures>{pressures};

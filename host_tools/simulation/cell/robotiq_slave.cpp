@@ -106,7 +106,7 @@ private:
 
   bool has(std::uint16_t bit) const { return (command_[0] & bit) != 0; }
 
-  GripperMove wanted() const {
+  GripCommand wanted() const {
     const GripperTraits &traits = motion_.mechanics().traits;
     const auto scaled = [](int value, double least, double most) { return least + (most - least) * value / 255.0; };
     const double step_mm = traits.stroke_mm / (CLOSED_COUNT - OPEN_COUNT);

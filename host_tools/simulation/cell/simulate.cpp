@@ -11,6 +11,7 @@
 #include <cmath>
 #include <csignal>
 #include <filesystem>
+#include <utility>
 
 using namespace fingertip;
 using namespace fingertip::cell;
@@ -20,8 +21,6 @@ namespace {
 
 struct Options : SimulationOptions {
   std::string ports, kind;
-  PressOptions press;
-  LiftOptions lift;
   double pull_g = 0.0;
 };
 
@@ -47,19 +46,19 @@ void run(Options &options, bool is_lift, bool is_validate) {
   }
   options.cache = options.cache.empty() ? tables_for(is_lift ? LIFT_FACE : PRESS_FACE) : options.cache;
   if (is_lift) {
-    static_cast<SimulationOptions &>(options.lift) = options;
-    if (!options.kind.empty()) {
-      be_of_kind(options.lift, kind_of(options.kind));
+    if (!options.kind.empty()) { // whose errors and delays of frames are no part of it: the fingertips are the firmware
+      GraspScenario &grasp = options.world.grasp;
+      const GraspScenario given = std::exchange(grasp, draw_grasp(kind_of(options.kind), options.seed, 0));
+      grasp.stiffness_N_mm = given.stiffness_N_mm;
+      grasp.down_rad = given.down_rad;
     }
-    check(options.lift);
-    lift(options.lift, Place(options.ports));
+    lift(options, PortFolder(options.ports));
   } else if (is_validate) {
     const ValidatedOptions one = {
-        .weight_g = options.press.weight_g, .pulling = {.weight_g = options.pull_g}, .seed = options.seed, .cache = options.cache};
-    validate(one, options.seconds, Place(options.ports));
+        .weight_g = options.weight_g, .pulling = {.weight_g = options.pull_g}, .seed = options.seed, .cache = options.cache};
+    validate(one, options.seconds, PortFolder(options.ports));
   } else {
-    static_cast<SimulationOptions &>(options.press) = options;
-    press(options.press, Place(options.ports));
+    press(options, PortFolder(options.ports));
   }
 }
 
@@ -72,7 +71,7 @@ int main(int argc, char **argv) {
                "fingertip simulate");
   const auto name_of_any = [](auto one) { return name_of(one); };
   Options options;
-  KindOfGrasp &object = options.lift.world.grasp;
+  GraspScenario &object = options.world.grasp;
   object.down_rad = M_PI_2; // the fingertips' cables leave upwards
   double friction = object.pads[0].friction;
   std::string shape = name_of(object.shape);
@@ -90,7 +89,7 @@ int main(int argc, char **argv) {
   CLI::Option *press_flag = app.add_flag(
       "--press", is_press,
       "A weight on a ball of 15 mm is set down here and there, for two seconds each time; this is what happens without an option");
-  CLI::Option *mouse_flag = app.add_flag("--mouse", options.press.by_hand,
+  CLI::Option *mouse_flag = app.add_flag("--mouse", options.by_hand,
                                          "A hand presses the ball: yours, with the pointer on the pad in the page of `fingertip web`");
   CLI::Option *lift_flag =
       app.add_flag("--lift", is_lift,
@@ -117,12 +116,12 @@ int main(int argc, char **argv) {
   add("--truth", options.truth, "FILE.csv", "Keeps what is true");
   app.add_flag("--overwrite", options.overwrite, "Replace FILE.csv if it exists");
   add("--cache", options.cache, "FOLDER", "Of contact tables; default: those installed, else ~/.cache/fingertip");
-  for (CLI::Option *option : {add("--fingertips", options.press.fingertips, "N", "How many")->check(within(1, 2)),
-                              add("--weight", options.press.weight_g, "GRAMS", "What is set down")->check(within(20.0, 2000.0))}) {
+  for (CLI::Option *option : {add("--fingertips", options.fingertips, "N", "How many")->check(within(1, 2)),
+                              add("--weight", options.weight_g, "GRAMS", "What is set down")->check(within(20.0, 2000.0))}) {
     option->excludes(lift_flag)->group("Presses")->capture_default_str();
   }
 
-  for_lift(app.add_option("--gripper", options.lift.model, "Which one"))
+  for_lift(app.add_option("--gripper", options.model, "Which one"))
       ->check(CLI::IsMember(texts_of(gripper_models(), [](const auto &one) { return one.model; })))
       ->capture_default_str();
   CLI::Option *kind = app.add_option("--kind", options.kind, "A grasp of this kind, drawn by the seed: object, lift, and what happens then")
@@ -146,7 +145,7 @@ int main(int argc, char **argv) {
   for_lift(app.add_flag("--by-command", by_command, "Lift only on the command, not once the force is steady"));
   for_lift(add("--then", planned_texts, "KIND:AMOUNT@S",
                "A disturbance: pour:MASSES, knock:M/S, slick:SHARE, or lower:SECONDS onto the table, @SECONDS after the lift"));
-  lift_number("--patience", options.lift.patience_s, "S", 0.0, 3600.0,
+  lift_number("--patience", options.patience_s, "S", 0.0, 3600.0,
               "Longest pause of the world while fingertips or the gripper's client are held up");
   for (CLI::Option *option : of_lift) {
     option->needs(lift_flag)->group("Lifts");
@@ -157,10 +156,10 @@ int main(int argc, char **argv) {
     }
     std::signal(SIGPIPE, SIG_IGN);
     for (const std::string &text : planned_texts) {
-      options.lift.world.planned.push_back(planned(text));
+      options.world.planned.push_back(planned(text));
     }
-    options.lift.world.lifts_by_itself = !by_command;
-    object.shape = shape_of(shape);
+    options.world.lifts_by_itself = !by_command;
+    object.shape = *find_in(SHAPES, [&](Shape one) { return shape == name_of(one); });
     object.pads[0].friction = object.pads[1].friction = friction;
     stiffen(object);
     run(options, is_lift, is_validate);

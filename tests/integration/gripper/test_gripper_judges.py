@@ -93,17 +93,6 @@ class Feetech(unittest.TestCase):
             self.assertEqual(rest(), 2700)
             asked(servo.write1ByteTxRx, 6, scservo_sdk.SMS_STS_TORQUE_ENABLE, 1)
             self.assertEqual(rest(), 2100)
-            asked(servo.RegWritePosEx, 6, 2400, 2000, 50)
-            self.assertEqual(rest(), 2100)
-            servo.RegAction()
-            self.assertEqual(rest(), 2400)
-            self.assertTrue(servo.SyncWritePosEx(6, 2500, 2000, 50))
-            servo.groupSyncWrite.txPacket()
-            self.assertEqual(rest(), 2500)
-            group = scservo_sdk.GroupSyncRead(servo, scservo_sdk.SMS_STS_PRESENT_POSITION_L, 4)
-            self.assertTrue(group.addParam(6))
-            self.assertEqual(group.txRxPacket(), scservo_sdk.COMM_SUCCESS)
-            self.assertEqual(group.getData(6, scservo_sdk.SMS_STS_PRESENT_POSITION_L, 2), 2500)
             port.closePort()
 
 

@@ -21,7 +21,7 @@ TEST(Face, FeelsWhatTheTwinDoes) {
     const twin::Layer layer = twin::silicone(12.0);
     const auto table = twin::ContactTable::load_or_build(twin::indenter(name), layer, FINGERTIP_TEST_TABLES);
     const twin::TractionTable traction(table, layer);
-    const Face face(name, 12.0, FINGERTIP_TEST_TABLES);
+    const Face face(name, FINGERTIP_TEST_TABLES);
     Random random(3, 1, 1);
     for (int i = 0; i < 300; i++) {
       Patch touch;
@@ -48,15 +48,15 @@ TEST(Face, FeelsWhatTheTwinDoes) {
         ASSERT_NEAR(sensed_Pa[k], expected_Pa, 1e-9 * peak_Pa) << name << " " << i;
       }
     }
-    EXPECT_EQ(face.base_Pa({}), Pressures{});
+    EXPECT_EQ(face.base_Pa({}), Pressures(SENSORS));
   }
 }
 
-TEST(Face, KnowsNoOther) { EXPECT_THROW(Face("banana", 12.0, FINGERTIP_TEST_TABLES), std::runtime_error); }
+TEST(Face, KnowsNoOther) { EXPECT_THROW(Face("banana", FINGERTIP_TEST_TABLES), std::runtime_error); }
 
 // Of a line or an area: as many contacts side by side.
 TEST(Face, ALongContactIsItsPartsAndKeepsForceAndPlace) {
-  const Face face("sphere15", 12.0, FINGERTIP_TEST_TABLES);
+  const Face face("sphere15", FINGERTIP_TEST_TABLES);
   Patch point;
   point.force_N = 2.0;
   const double peak_Pa = face.base_Pa(point)[7];
@@ -74,7 +74,7 @@ TEST(Face, ALongContactIsItsPartsAndKeepsForceAndPlace) {
   // The nodes of a long one with their force, by hand.
   Patch two = point;
   two.length_mm = 8.0;
-  Pressures sum{};
+  Pressures sum(SENSORS);
   for (const double u_mm : {-2.0, 2.0}) {
     Patch half = point;
     half.force_N = 1.0;
@@ -90,7 +90,7 @@ TEST(Face, ALongContactIsItsPartsAndKeepsForceAndPlace) {
 }
 
 TEST(Face, AnAreaIsHeldInByItsOwnWidth) {
-  const Face face("sphere15", 12.0, FINGERTIP_TEST_TABLES);
+  const Face face("sphere15", FINGERTIP_TEST_TABLES);
   Patch area;
   area.force_N = 10.0;
   area.length_mm = 36.0;
@@ -121,7 +121,7 @@ static GripReading felt(GripFinger &finger, const Pressures &base_Pa, double &t_
 }
 
 TEST(Face, AGraspReadsForceAndLoadOfLinesAndAreas) {
-  const Face face("sphere15", LAYER_mm, FINGERTIP_TEST_TABLES);
+  const Face face("sphere15", FINGERTIP_TEST_TABLES);
   for (const double length_mm : {0.0, 12.0, 24.0, 36.0}) {
     for (const double width_mm : {0.0, 12.0, 24.0, 36.0, 50.0}) {
       for (const bool across : {false, true}) {

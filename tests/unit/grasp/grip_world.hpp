@@ -74,7 +74,7 @@ public:
   GripSettings settings;
   Grip grip;
   GripCommand command;
-  GripReport report;
+  GripReport report{};
   double t_s = 1.0, width_mm = 60.0, force_N = 0.0, load_N = 0.0, slide_mm_s = 0.0;
   double object_mm = 40.0, stiffness = 3.0, power = 1.6; // of a pad at 1 mm; 0 mm: nothing there
   double off_mm = 0.0;                                   // the object presses fingertip 0 by so much more, fingertip 1 less

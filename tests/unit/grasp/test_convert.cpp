@@ -1,4 +1,4 @@
-#include "grasp/fingertip.hpp"
+#include "grasp/control/finger.hpp"
 #include "support/host_packets.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // The C interface gives what the C++ class gives, to the last bit, and allocates nothing on the way.
-#include "grasp/fingertip.hpp"
+#include "grasp/control/grip.hpp"
 #include "grasp/settings.hpp"
 #include "grasp/words.hpp"
 #include "libfingertip/fingertip_values.hpp"

@@ -38,7 +38,7 @@ TEST(GraspSettings, EveryFieldIsThereOnce) {
   GripSettings settings;
   for (const GraspSetting &setting : grasp_settings()) {
     EXPECT_TRUE(names.insert(setting.name).second) << setting.name;
-    EXPECT_TRUE(fields.insert(&setting.field(settings)).second) << setting.name;
+    EXPECT_TRUE(fields.insert(&(settings.*setting.field)).second) << setting.name;
   }
   /* mode is --fixed; all others are doubles */
   EXPECT_EQ(fields.size(), (sizeof(GripSettings) - offsetof(GripSettings, touch_N)) / sizeof(double));

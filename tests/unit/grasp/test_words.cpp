@@ -27,7 +27,7 @@ TEST(Words, EveryTroubleHasAName) {
   for (std::uint32_t bit = 1; bit <= all; bit <<= 1) {
     EXPECT_FALSE(trouble_names(bit).empty()) << bit;
     EXPECT_EQ(trouble_of_names(trouble_names(bit)), bit);
-    GripReport report;
+    GripReport report{};
     report.trouble = bit;
     EXPECT_EQ(trouble_texts(report).size(), 1u) << bit;
   }
@@ -38,7 +38,7 @@ TEST(Words, EveryTroubleHasAName) {
 }
 
 TEST(Words, TroublesHaveTheirNumbers) {
-  GripReport report;
+  GripReport report{};
   report.trouble = GRIP_FINGERS_DIFFER | GRIP_FINGER_1_LATE;
   report.finger_N[0] = 3.1, report.finger_N[1] = 4.6;
   report.delay_s = 0.061;

@@ -39,7 +39,7 @@ inline std::unique_ptr<Gripper> activated(const std::string &model, Served &simu
   return gripper;
 }
 
-inline GripperStatus moved(Served &simulated, Gripper &gripper, const GripperMove &move) {
+inline GripperStatus moved(Served &simulated, Gripper &gripper, const GripCommand &move) {
   const GripperStatus first = gripper.move(move);
   EXPECT_TRUE(first.active);
   EXPECT_FALSE(first.moving && first.object);

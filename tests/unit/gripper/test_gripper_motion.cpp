@@ -14,7 +14,7 @@ static void run(GripperMotion &motion, double seconds) {
   }
 }
 
-static void run(GripperMotion &motion, const GripperMove &move, double seconds) {
+static void run(GripperMotion &motion, const GripCommand &move, double seconds) {
   motion.move(move);
   run(motion, seconds);
 }
@@ -168,7 +168,7 @@ TEST(GripperMotion, WithoutPowerTheFingersStay) {
 TEST(GripperMotion, TheSameCommandAgainIsNone) {
   GripperMotion motion = activated("2f85");
   motion.blocked_at = spring(40, 10);
-  const GripperMove grip = {.width_mm = 0, .speed_mm_s = 100, .force_N = 30};
+  const GripCommand grip = {.width_mm = 0, .speed_mm_s = 100, .force_N = 30};
   run(motion, grip, 1.0);
   motion.move(grip);
   EXPECT_FALSE(motion.moving());

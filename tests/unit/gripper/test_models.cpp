@@ -15,7 +15,7 @@ protected:
 };
 
 TEST_P(GripperTest, SaysWhatIsWrongWithAnAnswerAndGoesOn) {
-  const GripperMove move = {.width_mm = 50, .speed_mm_s = 100};
+  const GripCommand move = {.width_mm = 50, .speed_mm_s = 100};
   gripper_->move(move);
   gripper_->move(move);
   const std::string line = gripper_->line();

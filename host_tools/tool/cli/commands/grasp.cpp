@@ -1,5 +1,4 @@
 /* A grasp from a terminal: two fingertips and a gripper, shown, recorded and controlled. */
-#include "grasp/fingertip.hpp"
 #include "grasp/grasp_loop.hpp"
 #include "grasp/grip_row.hpp"
 #include "grasp/gripper/gripper.hpp"
@@ -62,6 +61,8 @@ constexpr std::int64_t ROW_us = 10000;
 constexpr std::int64_t TARING_us = 3000000;
 /* Without a terminal it ends TAIL_us after the grasp, and waits INACTIVE_us at most for a gripper that may not be activated. */
 constexpr std::int64_t TAIL_us = 300000, INACTIVE_us = 2000000;
+/* At this frame rate an object at 0.1 m/s slides by a millimetre between two frames. */
+constexpr std::uint32_t RATE_LEAST_mHz = 100000;
 
 constexpr struct {
   char key;
@@ -106,6 +107,33 @@ std::array<Endpoint, FINGERS> ways_of(const GraspOptions &options) {
                 "; plug them in, or choose with --left and --right");
   }
   return {left.value_or(others.front()), right.value_or(others.back())};
+}
+
+/* Throws Error: it cannot take part in a grasp at all. */
+void check_for_grasp(const std::string &name, const wire_info &info, const wire_health &health) {
+  if ((info.capabilities & WIRE_CAPABILITY_FIT) == 0) {
+    throw Error(name + ": firmware of scene " + text_field(info.scene) + " reports no force; flash scene grasp");
+  }
+  if ((health.sensors_present & first_sensors(info.sensor_count)) == 0) {
+    throw Error(name + ": none of its sensors answers; see their wiring and supply (fingertip info)");
+  }
+}
+
+/* What allows a grasp, but should be mended: a line each. needs_load: the force follows the load. */
+std::vector<std::string> lacks_for_grasp(const wire_info &info, bool needs_load) {
+  std::vector<std::string> lacks;
+  if (needs_load && (info.capabilities & WIRE_CAPABILITY_TANGENTIAL) == 0) {
+    lacks.push_back("no load is estimated, only places show it: flash scene grasp");
+  } else if (needs_load && (info.stored & WIRE_STORED_PAD) == 0) {
+    lacks.push_back("no load is estimated, only places show it: fingertip pad");
+  }
+  if ((info.stored & WIRE_STORED_CALIBRATION) == 0) {
+    lacks.push_back("forces may be off by some 10 %: fingertip calibrate");
+  }
+  if (info.rate_mHz != 0 && info.rate_mHz < RATE_LEAST_mHz) {
+    lacks.push_back("sees slides late at " + fixed(info.rate_mHz / 1e3, 1) + " frames a second: fingertip set rate=max");
+  }
+  return lacks;
 }
 
 class GraspSession {
