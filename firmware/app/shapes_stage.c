@@ -7,6 +7,7 @@
 
 void shapes_stage_start(struct shapes_stage *stage, const struct fit_array *array, struct jobs *jobs) {
   stage->job.array = array;
+  stage->job.before = &jobs->worker[JOB_TANGENTIAL];
   stage->begins = true;
   jobs_set(jobs, JOB_SHAPES, shapes_estimate, &stage->job);
 }

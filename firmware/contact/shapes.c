@@ -3,6 +3,7 @@
 #include "common/contact_flags.h"
 #include "fit/fit_math.h"
 #include "port/divide.h"
+#include "worker/worker.h"
 
 #include <math.h>
 #include <string.h>
@@ -79,7 +80,7 @@ void shapes_estimate(void *job) {
     const bool knows = own->progress == FIT_SHAPES_ANSWERED && own->result.shape != FIT_SHAPE_UNDECIDED;
     /* What is begun is ended with the same readings, so the next one begins only if it ends here. */
     goes_on = own->progress == FIT_SHAPES_UNFINISHED ? parts > 0 : parts >= FIT_SHAPES_PARTS && !knows;
-  } while (goes_on);
+  } while (goes_on && (!own->before || worker_is_free(own->before)));
   /* A shape that is none of these is fitted from the beginning again, and stays so until it is known. */
   const bool again =
       own->result.shape == FIT_SHAPE_UNDECIDED && !question->begins && own->report.shape == FIT_SHAPE_NONE && own->state.frames > 0;

@@ -27,6 +27,7 @@ struct shapes_report {
  * frames that follow leave it alone. */
 struct shapes_job {
   const struct fit_array *array;
+  const struct worker *before; /* its question ends this job after the part under way; NULL: none does */
   struct fit_shapes_pad pad;
   struct shapes_question {
     bool begins;   /* a contact: forget the one before */

@@ -199,6 +199,19 @@ TEST(a_search_for_an_outlier_is_of_fast_frames) {
   TEST_ASSERT_EQUAL(0, app.stages.location.outliers.outlier);
 }
 
+/* All of them would keep the load of a frame that comes early waiting for twenty frames. */
+TEST(shapes_give_way_to_the_load_after_each_part) {
+  put(1.5, -4.0, 5.0);
+  last_of_press();
+  struct shapes_job *job = &app.stages.shapes.job;
+  job->question.begins = true;
+  job->question.parts = FIT_SHAPES_FRAMES * FIT_SHAPES_PARTS;
+  worker_ask(&app.stages.jobs.worker[JOB_TANGENTIAL]);
+  shapes_estimate(job);
+  TEST_ASSERT_EQUAL(FIT_SHAPES_UNFINISHED, job->progress);
+  TEST_ASSERT_EQUAL(1, job->state.part);
+}
+
 /* Here each frame has time for several frames' worth of parts. */
 TEST(each_answer_says_how_old_it_is) {
   put(0.0, 8.0, 4.0);
