@@ -107,7 +107,8 @@ class Fit(unittest.TestCase):
                 np.testing.assert_allclose(known["force_sd_N"], wanted_N, rtol=2e-3)  # bits of fit_quadrature()
         self.assertGreater(known["q_sd_N"][0], 0.1 * abs(known["qx_N"][0]))  # the scale of silicone that nobody has pulled
         *xy_mm, dented_Pa = presses(PAD, 200, 2.5, seed=5)
-        dented = fingertip.fit(dented_Pa - 200.0 * responses(PAD, *xy_mm, 6.25), "2x4", calibration={"sigma_mm": 2.5, "sigma_sd_mm": 0.1})
+        known = {"sigma_mm": 2.5, "sigma_sd_mm": 0.1, "dip_share": 0.0005, "dip_sd_mm": 6.25}
+        dented = fingertip.fit(dented_Pa - 200.0 * responses(PAD, *xy_mm, 6.25), "2x4", calibration=known)
         self.assertTrue((dented["location_sd_mm"] > dented["sigma_mm"]).any())  # it may be pulled, which takes nothing of its force
         np.testing.assert_allclose(dented["force_N"], 2e-6 * np.pi * dented["p0_Pa"] * dented["sigma_mm"] ** 2, rtol=1e-5)
 

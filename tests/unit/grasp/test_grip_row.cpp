@@ -22,7 +22,7 @@ static GripRow row_with_everything() {
   row.report.width_mm = 34.217;
   row.report.delay_s = 0.012;
   row.report.slides = 3;
-  row.command = {{34.201, 150.0, 20.0}, GRIP_MOVE};
+  row.command = {34.201, 150.0, 20.0, GRIP_MOVE};
   row.status = GripperStatus{-17, true, false, true, 34.217, 0.125, 9};
   return row;
 }

@@ -39,7 +39,7 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
   GripperThread thread(open()(), open());
   EXPECT_TRUE(comes(thread, is_answer));
   for (const double width_mm : {40.0, 39.0, 38.0}) {
-    thread.command({{width_mm, 50.0, 0.0}, GRIP_MOVE});
+    thread.command({width_mm, 50.0, 0.0, GRIP_MOVE});
   }
   const HostTime patience = host_now() + PATIENCE;
   while (!thread.is_done() && host_now() < patience) {
@@ -48,7 +48,7 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
   EXPECT_TRUE(thread.is_done());
   EXPECT_TRUE(comes(thread, [](const auto &news) { return news.status && news.status->width_mm < 50; }));
   for (int i = 0; i < 5; i++) {
-    thread.command({{38.0, 50.0, 0.0}, GRIP_MOVE}); /* the same */
+    thread.command({38.0, 50.0, 0.0, GRIP_MOVE}); /* the same */
     EXPECT_TRUE(comes(thread, is_answer));
   }
   const auto moves = state_->moves();
@@ -58,7 +58,7 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
   EXPECT_EQ(state_->activations, 0);
   /* staying sends nothing */
   const std::size_t before = moves.size();
-  thread.command({GRIP_STAY, 10000, 0, 0});
+  thread.command({.width_mm = 10000});
   EXPECT_TRUE(comes(thread, is_answer));
   EXPECT_EQ(state_->moves().size(), before);
 }
@@ -66,7 +66,7 @@ TEST_F(GripperThreadTest, TheNewestCommandGoesOutOnceAndAnswersComeBack) {
 TEST_F(GripperThreadTest, ActivatesOnceForEachCommand) {
   GripperThread thread(open()(), open());
   for (int i = 0; i < 10; i++) {
-    thread.command({{}, GRIP_ACTIVATE});
+    thread.command({.motion = GRIP_ACTIVATE});
     EXPECT_TRUE(comes(thread, is_answer));
   }
   EXPECT_EQ(state_->activations, 1);
@@ -77,8 +77,8 @@ TEST_F(GripperThreadTest, SilenceIsToldOnceAndTheNewestCommandWaitsForTheEndOfIt
   EXPECT_TRUE(comes(thread, is_answer));
   state_->silent = true;
   EXPECT_TRUE(comes(thread, is_trouble));
-  thread.command({{30.0, 50.0, 0.0}, GRIP_MOVE});
-  thread.command({{20.0, 50.0, 0.0}, GRIP_MOVE});
+  thread.command({30.0, 50.0, 0.0, GRIP_MOVE});
+  thread.command({20.0, 50.0, 0.0, GRIP_MOVE});
   const int before = state_->exchanges;
   while (state_->exchanges < before + 20) {
     pass();
@@ -128,7 +128,7 @@ TEST_F(GripperThreadTest, EndsWhileTheLineIsSlow) {
   state_->delay_ms = 30;
   {
     GripperThread thread(open()(), open());
-    thread.command({{30.0, 50.0, 0.0}, GRIP_MOVE});
+    thread.command({30.0, 50.0, 0.0, GRIP_MOVE});
   }
   const int after = state_->exchanges;
   pass(milliseconds(100));
