@@ -151,8 +151,8 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], s
   }
   frame->valid = valid;
   frame->saturated &= valid;
-  frame->doubtful = valid & readings->doubtful;
-  frame->unsettled = valid & readings->doubted;
+  frame->doubtful = readings->moved ? valid : valid & readings->doubtful;
+  frame->unsettled = readings->moved ? valid : valid & readings->doubted;
   frame->renewed = readings->renewed;
   readings->renewed = 0;
   frame->restored = readings->restored;

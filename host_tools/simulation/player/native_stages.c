@@ -98,7 +98,9 @@ void native_stages_repeat(struct native_stages *all, const struct wire_packet *p
   frame->valid = raw->valid;
   frame->saturated = raw->saturated;
   frame->doubtful = held && (raw->flags & CONTACT_FLAG_SENSOR_DOUBTFUL) ? ~(sensor_map)0 : raw->doubtful; /* a held one has no map */
-  frame->unsettled = raw->doubtful == raw->valid ? raw->valid : 0; /* what has moved is doubted whole (scan/readings.h) */
+  const bool doubted_before = all->scan.readings.moved; /* what has moved is doubted whole, first after the fit (scan/readings.h) */
+  all->scan.readings.moved = held ? doubted_before : raw->doubtful == raw->valid;
+  frame->unsettled = doubted_before && all->scan.readings.moved ? raw->valid : 0;
   memcpy(frame->pressure_Pa_q10, raw->pressure_Pa_q10, sizeof frame->pressure_Pa_q10);
   stages_process(&all->stages, &all->found, &all->scan, 0);
   const struct wire_stages stages = contact->stages;
