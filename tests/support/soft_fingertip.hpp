@@ -117,7 +117,8 @@ private:
     const float noise = 1e-3f * static_cast<float>(frame_ % 17);
     contact.flags = CONTACT_FLAG_TARED | feel.flags;
     if (touches) {
-      contact.flags |= CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TANGENTIAL_VALID;
+      contact.flags |= CONTACT_FLAG_CONTACT | CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_UNCERTAINTY_VALID | CONTACT_FLAG_TANGENTIAL_VALID |
+                       CONTACT_FLAG_VELOCITY_VALID;
       contact.force_N = feel.force_N + noise;
       contact.x_mm = noise;
       contact.y_mm = 2;
@@ -126,6 +127,8 @@ private:
       contact.qx_N = noise;
       contact.qy_N = feel.qy_N;
       contact.q_sd_N = 0.05f;
+      contact.vx_mm_s = 0;
+      contact.vy_mm_s = (feel.flags & CONTACT_FLAG_SLIDING) != 0 ? 20.0f : 0.0f;
       contact.tangential_ratio = feel.qy_N / feel.force_N;
     }
     say(packet);
