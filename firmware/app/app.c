@@ -87,7 +87,7 @@ void app_start(struct app *app, const struct array_bus *bus) {
 
 void app_process_frame(struct app *app, uint64_t taken_us) {
   struct findings *found = &app->found;
-  stages_process(&app->stages, found, &app->scan, (uint32_t)taken_us);
+  stages_process(&app->stages, found, (uint32_t)taken_us);
   stages_send(&app->stages, found, app->commands.streams, &app->line);
   stages_after_send(&app->stages, found, &app->scan);
 }

@@ -6,8 +6,6 @@
 
 #include <string.h>
 
-/* A third of what is left by a dip that changes a press of 5 N by a tenth or 0.6 mm. A pad that is no Gaussian to this has temperatures. */
-#define PRESS_SD_Pa 64
 /* A scene without a stage has no use for what is meant for it. */
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 
@@ -55,12 +53,6 @@ static void fit_readings(struct stages *stages, struct findings *found) {
 #endif
 }
 
-/* Whether one press explains every reading: a dip shifts some by the same, which is no Gaussian. The fit cuts what is below zero. */
-static bool is_a_press(const struct findings *found) {
-  return FT_WITH_FIT && found->fit.used == first_sensors(found->frame.sensor_count) && found->fit.residual_rms_Pa < PRESS_SD_Pa &&
-         found->conditioned.lowest_Pa_q10 > -PRESS_SD_Pa * 1024;
-}
-
 /* The list of stages from there on. Not part of the other, whose stack lies below that of the fit. */
 static __attribute__((noinline)) void judge_fit(struct stages *stages, struct findings *found) {
   begin(found, CRASH_AT_CONTACT);
@@ -95,7 +87,7 @@ static __attribute__((noinline)) void judge_fit(struct stages *stages, struct fi
 #endif
 }
 
-void stages_process(struct stages *stages, struct findings *found, struct scan *scan, uint32_t taken_us) {
+void stages_process(struct stages *stages, struct findings *found, uint32_t taken_us) {
   const uint32_t read_us = (uint32_t)found->frame.t_read_us;
   memset(found->spent_us, 0, sizeof found->spent_us);
   found->slept_us = 0;
@@ -108,7 +100,6 @@ void stages_process(struct stages *stages, struct findings *found, struct scan *
     contact_stage_hold(found);
   } else {
     fit_readings(stages, found);
-    scan_judge(scan, is_a_press(found), &found->frame);
     judge_fit(stages, found);
   }
   begin(found, CRASH_AT_PACKET);

@@ -57,7 +57,7 @@ struct stages {
 void stages_start(struct stages *stages);
 
 /* Takes a frame from its readings to what its packets report. taken_us: when the frame was taken, modulo 2^32. */
-void stages_process(struct stages *stages, struct findings *found, struct scan *scan, uint32_t taken_us);
+void stages_process(struct stages *stages, struct findings *found, uint32_t taken_us);
 
 /* Sends the packets that these streams ask for (enum wire_stream). */
 void stages_send(const struct stages *stages, const struct findings *found, uint8_t streams, struct line *line);

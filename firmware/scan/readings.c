@@ -106,19 +106,13 @@ static struct glance compensate(const struct readings *readings, const uint32_t 
   return glance;
 }
 
-__attribute__((cold)) bool readings_judge(struct readings *readings, bool is_a_press, struct frame *frame) {
-  const int32_t *kept_Pa_q10 = readings->last_Pa_q10[readings->newest];
-  const bool asked = readings->asks;
+static __attribute__((noinline, cold)) uint32_t moved_Pa(const struct readings *readings, const int32_t kept_Pa_q10[],
+                                                         uint8_t sensor_count) {
   uint32_t sum_Pa = 0;
-  for (uint8_t k = 0; k < frame->sensor_count && !is_a_press && readings->frames > READINGS_ASK_FRAMES; k++) {
+  for (uint8_t k = 0; k < sensor_count; k++) {
     sum_Pa += size_of(difference(kept_Pa_q10[k], readings->vouched_Pa_q10[k])) >> 10;
   }
-  readings->moved = readings->moved || readings->jolted || (sum_Pa > READINGS_MOVED_Pa && readings->frames > READINGS_MOVED_FRAMES);
-  readings->asks = readings->asks || readings->moved || sum_Pa > READINGS_MOVED_Pa / 2;
-  if (readings->moved) {
-    frame->doubtful = frame->unsettled = frame->valid;
-  }
-  return readings->asks && !asked;
+  return sum_Pa;
 }
 
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], sensor_map good, struct frame *frame) {
@@ -138,6 +132,9 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], s
       step + frame->sensor_count * noises >= READINGS_JOLT_Pa_q10) {
     left_out = look_closer(readings, frame, usable, last_Pa_q10, kept_Pa_q10);
   }
+  const uint32_t sum_Pa = readings->frames < READINGS_ASK_FRAMES ? 0 : moved_Pa(readings, kept_Pa_q10, frame->sensor_count);
+  readings->moved = readings->moved || readings->jolted || (sum_Pa > READINGS_MOVED_Pa && readings->frames >= READINGS_MOVED_FRAMES);
+  readings->asks = readings->asks || readings->moved || sum_Pa > READINGS_MOVED_Pa / 2;
   if (readings->frames < READINGS_FRAMES_MAX) {
     readings->frames++;
   }

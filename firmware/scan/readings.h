@@ -8,8 +8,8 @@
  * again, and so may most others (supplies that dip once do so twice). If resets do not help for a second, and it reports
  * the same twice, it is believed. Far from the others' it stays doubtful.
  *
- * Moves. A sensor whose supply dips may go on with codes that are off, at once or ever more: 1 % of a code is 2.6 kPa and 2.7 degC. So only
- * a temperature vouches for pressures that have moved and are not those of a press. It is asked for once all sensors together have moved by
+ * Moves. A sensor whose supply dips may go on with codes that are off, at once or ever more: 1 % of a code is 2.6 kPa
+ * and 2.7 degC. So only a temperature vouches for pressures that have moved. It is asked for once all sensors together have moved by
  * half of READINGS_MOVED_Pa since the last one. If it comes too late, they are used, but all of them are doubtful until it comes. So they
  * are when one of them moves by READINGS_JOLT_Pa_q10 at once, or has lost its admission. While a temperature moves by half of
  * READINGS_MOVED_cC, or a code is that of the frame before, the doubt lasts. Codes that are off while the temperature's are right look
@@ -133,6 +133,3 @@ void readings_doubt(struct readings *readings, sensor_map apart);
 /* Fills in pressures, valid, doubtful, unsettled, saturated, renewed and restored. code: [sensor];
  * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost: some 140 Cortex-M0+ cycles a sensor. */
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], sensor_map good, struct frame *frame);
-
-/* Then: doubts a frame that has moved. is_a_press: one alone makes all its readings. Returns whether to ask for a temperature. */
-bool readings_judge(struct readings *readings, bool is_a_press, struct frame *frame);

@@ -562,17 +562,15 @@ bool scan_take(struct scan *scan, struct frame *frame) {
   }
   fill_head(scan, &scan->slot.conversion, frame);
   struct readings *readings = &scan->readings;
+  const bool asked = readings->asks;
   readings->jolted = readings->jolted || (scan->slot.zero | (readings->counted & ~scan_read_map(&scan->admitted))) != 0;
   readings->still = scan->slot.still;
   if (readings_take_pressures(readings, scan->slot.code, scan->slot.good, frame)) {
     report(scan);
   }
-  hand_over(&scan->slot_state, SCAN_SLOT_EMPTY);
-  return true;
-}
-
-void scan_judge(struct scan *scan, bool is_a_press, struct frame *frame) {
-  if (readings_judge(&scan->readings, is_a_press, frame)) {
+  if (readings->asks && !asked) {
     set(&scan->temperature_within_us, TEMPERATURE_AT_ONCE_us);
   }
+  hand_over(&scan->slot_state, SCAN_SLOT_EMPTY);
+  return true;
 }

@@ -22,9 +22,9 @@
  *
  * Temperatures are converted twice a second, less often while they are constant. Where the requested rate leaves a
  * pause, that is done in the pause before a frame. Otherwise it takes the place of a frame, at most one in 600 at OSR
- * 256 and one in 25 at OSR 8192, and one in 32 while pressures move as in no press (readings.h). That frame goes out at its time too, with
- * the pressures of the one before, and marked as held. All ones are no reading. A sensor's last temperature is forgotten when it is
- * admitted again. Its next temperature is the next conversion. */
+ * 256 and one in 25 at OSR 8192, and one in 32 while pressures move (readings.h). That frame goes out at its time too, with the pressures
+ * of the one before, and marked as held. All ones are no reading. A sensor's last temperature is forgotten when it is admitted again. Its
+ * next temperature is the next conversion. */
 #pragma once
 
 #include "array_bus/array_bus.h"
@@ -191,9 +191,8 @@ static inline bool scan_has_news(const struct scan *scan) {
 }
 
 /* Main context. True: *frame, which must still hold the frame before, holds a new one. False:
- * nothing new (a temperature may have been used up). Then, if it is not held: see readings_judge(). */
+ * nothing new (a temperature may have been used up). */
 bool scan_take(struct scan *scan, struct frame *frame);
-void scan_judge(struct scan *scan, bool is_a_press, struct frame *frame);
 
 /* Main context. Resting: what is under way ends, then there is no conversion and nothing on the bus
  * until the rest ends, 10 ms later at most. */

@@ -73,7 +73,7 @@ void native_stages_frame(struct native_stages *all, uint64_t t_us, const int32_t
   frame->noise_Pa_q10 = noise_Pa_q10;
   frame->valid = first_sensors(geometry.sensor_count);
   memcpy(frame->pressure_Pa_q10, pressure_Pa_q10, geometry.sensor_count * sizeof frame->pressure_Pa_q10[0]);
-  stages_process(&all->stages, &all->found, &all->scan, (uint32_t)t_us);
+  stages_process(&all->stages, &all->found, (uint32_t)t_us);
   memset(packet, 0, sizeof *packet);
   packet->type = WIRE_CONTACT;
   packet->t_us = t_us;
@@ -98,11 +98,9 @@ void native_stages_repeat(struct native_stages *all, const struct wire_packet *p
   frame->valid = raw->valid;
   frame->saturated = raw->saturated;
   frame->doubtful = held && (raw->flags & CONTACT_FLAG_SENSOR_DOUBTFUL) ? ~(sensor_map)0 : raw->doubtful; /* a held one has no map */
-  const bool doubted_before = all->scan.readings.moved; /* what has moved is doubted whole, first after the fit (scan/readings.h) */
-  all->scan.readings.moved = held ? doubted_before : raw->doubtful == raw->valid;
-  frame->unsettled = doubted_before && all->scan.readings.moved ? raw->valid : 0;
+  frame->unsettled = raw->doubtful == raw->valid ? raw->valid : 0; /* what has moved is doubted whole (scan/readings.h) */
   memcpy(frame->pressure_Pa_q10, raw->pressure_Pa_q10, sizeof frame->pressure_Pa_q10);
-  stages_process(&all->stages, &all->found, &all->scan, 0);
+  stages_process(&all->stages, &all->found, 0);
   const struct wire_stages stages = contact->stages;
   stages_fill_contact(&all->stages, &all->found, contact);
   contact->stages = stages;

@@ -24,17 +24,11 @@ struct found {
 };
 
 static double scale = 1.0; /* of all pressures */
-static double swing;       /* of the force, twice a second */
-
-static double share_of_force(uint64_t t_us) { return 1.0 + swing * (1.0 - cos(4e-6 * PI * (double)(t_us - press.from_us))); }
-
-static double changing_pressure_Pa(void *context, unsigned sensor, uint64_t t_us) {
-  return scale * (AMBIENT_Pa + share_of_force(t_us) * (world_pressure_Pa(context, sensor, t_us) - AMBIENT_Pa));
-}
+static double scaled_pressure_Pa(void *context, unsigned sensor, uint64_t t_us) { return scale * world_pressure_Pa(context, sensor, t_us); }
 
 static void press_for(double force_N, uint32_t idle_ms, uint32_t ms) {
   rig_start();
-  array.world.pressure_Pa = changing_pressure_Pa;
+  array.world.pressure_Pa = scaled_pressure_Pa;
   press.force_N = force_N;
   press.x_mm = 2.1;
   press.y_mm = 3.3;
@@ -45,12 +39,12 @@ static void press_for(double force_N, uint32_t idle_ms, uint32_t ms) {
 }
 
 /* Fewer than four sensors give no force, and say so. */
-static bool is_wrong(const struct wire_contact *contact, double force_N, bool few_are_left) {
+static bool is_wrong(const struct wire_contact *contact, bool few_are_left) {
   const uint32_t excuses = warnings | (few_are_left ? CONTACT_FLAG_SENSOR_MASKED : 0);
   if (!(contact->flags & CONTACT_FLAG_FIT_VALID)) {
     return !(contact->flags & excuses);
   }
-  return !(contact->flags & warnings) && (fabs((double)contact->force_N - force_N) > 0.1 * force_N ||
+  return !(contact->flags & warnings) && (fabs((double)contact->force_N - FORCE_N) > 0.1 * FORCE_N ||
                                           hypot((double)contact->x_mm - press.x_mm, (double)contact->y_mm - press.y_mm) > 0.6);
 }
 
@@ -79,7 +73,6 @@ static void follow_one(enum kind kind, unsigned k, double share, unsigned ms) {
 /* The zero of a sensor that was tared in the five seconds before is taken again after the contact (condition.h). */
 static void dip(enum kind kind, uint32_t idle_ms, unsigned count, unsigned first, uint32_t phase_us, double share, struct found *found) {
   const uint8_t sensors = geometry.sensor_count;
-  swing = kind == RAMP ? 0.2 : 0.0;
   press_for(FORCE_N, idle_ms, 1500);
   native_run_until(port_now_us() + phase_us, main_round, &app);
   drop_packets();
@@ -99,12 +92,12 @@ static void dip(enum kind kind, uint32_t idle_ms, unsigned count, unsigned first
     for (struct wire_packet p; next_packet(&p);) {
       if (p.type == WIRE_CONTACT) {
         trusted = (p.body.contact.flags & (CONTACT_FLAG_FIT_VALID | CONTACT_FLAG_SENSOR_MASKED | warnings)) == CONTACT_FLAG_FIT_VALID;
-        found->wrong_unflagged_frames += is_wrong(&p.body.contact, FORCE_N * share_of_force(p.t_us), sensors - count < 4);
+        found->wrong_unflagged_frames += is_wrong(&p.body.contact, sensors - count < 4);
         found->false_slips += (p.body.contact.flags & CONTACT_FLAG_SLIP) != 0;
       }
       const sensor_map believed = p.type == WIRE_RAW ? p.body.raw.valid & ~p.body.raw.doubtful : 0;
       for (unsigned k = 0; k < sensors; k++) {
-        const double off_Pa = p.body.raw.pressure_Pa_q10[k] / 1024.0 - changing_pressure_Pa(NULL, k, port_now_us());
+        const double off_Pa = p.body.raw.pressure_Pa_q10[k] / 1024.0 - world_pressure_Pa(NULL, k, port_now_us());
         found->raw_valid_wrong += (believed >> k & 1) && fabs(off_Pa) > RAW_MAX_Pa;
       }
     }

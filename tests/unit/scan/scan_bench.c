@@ -43,9 +43,6 @@ bool step(void) {
   }
   bool taken = taking && scan_take(&scan, &frame);
   frames += taken;
-  if (taken && !frame.held) {
-    scan_judge(&scan, false, &frame);
-  }
   now_us = wake_us + random_below(&lateness, lateness_us + 1);
   return taken;
 }
