@@ -251,12 +251,13 @@ void fit_bias_add(const struct fit_bias *bias, const struct fit_array *array, co
   if (!is_located(result) || (bias->known && bias->ratio == 0.0f)) {
     return;
   }
-  const bool narrow = result->sigma_mm < FIT_WIDTHS_SIGMA_MIN * array->pitch_mm && !fit_has_dip(settings);
-  const float by_pitch = (narrow ? SHIFT_PER_PITCH_NARROW : SHIFT_PER_PITCH) * array->pitch_mm,
-              by_sigma = SHIFT_PER_SIGMA * result->sigma_mm;
-  const bool assumed = !bias->known || (narrow && bias->ratio > FIT_BIAS_ASSUMED_RATIO);
-  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f, assumed ? FIT_BIAS_ASSUMED_RATIO : bias->ratio,
-                                          by_pitch > by_sigma ? by_pitch : by_sigma);
+  float per_pitch = SHIFT_PER_PITCH, ratio = bias->known ? bias->ratio : FIT_BIAS_ASSUMED_RATIO;
+  if (result->sigma_mm < FIT_WIDTHS_SIGMA_MIN * array->pitch_mm && !fit_has_dip(settings)) {
+    per_pitch = SHIFT_PER_PITCH_NARROW;
+    ratio = ratio < FIT_BIAS_ASSUMED_RATIO ? ratio : FIT_BIAS_ASSUMED_RATIO;
+  }
+  const float by_pitch = per_pitch * array->pitch_mm, by_sigma = SHIFT_PER_SIGMA * result->sigma_mm;
+  result->location_sd_mm = fit_quadrature(result->location_sd_mm, 1.0f, ratio, by_pitch > by_sigma ? by_pitch : by_sigma);
   if (result->location_sd_mm > fit_location_sd_limit_mm(settings)) {
     result->flags |= CONTACT_FLAG_UNCERTAIN;
   }

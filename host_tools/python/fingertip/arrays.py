@@ -88,8 +88,6 @@ class Library:
         return found
 
     def call(self, name, *values):
-        """None: no deviations of sensors."""
-        values = [self.made("fit_deviation", 0, 0) if value is None else value for value in values]
         values = [
             value.encode() if isinstance(value, str) else str(value).encode() if isinstance(value, pathlib.Path) else value
             for value in values
@@ -128,8 +126,9 @@ def usable_of(readings):
 
 
 class Firmware(Library):
-    def __init__(self, path):
-        super().__init__(path)
+    def call(self, name, *values):
+        """None: no deviations of sensors."""
+        super().call(name, *(self.made("fit_deviation", 0, 0) if value is None else value for value in values))
 
     @property
     def constants(self):
