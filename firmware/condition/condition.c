@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* warm: bitmap of the sensors that were calm just now. */
+/* warm: bitmap of the sensors that were steady just now. */
 static void begin(struct condition *condition, sensor_map warm) {
   memset(condition, 0, offsetof(struct condition, sensor));
   condition->begins = true;
@@ -75,7 +75,7 @@ static void take(struct condition *condition, uint8_t k, int32_t reading_Pa_q10)
   condition->zero_Pa_q10[k] = baseline;
   condition->margin_Pa_q10[k] = sensor->spread_Pa_q10;
   condition->tared_ms = 0;
-  condition->calm.snapshots = 0;
+  condition->snapshot_times.count = 0;
 }
 
 /* Takes the readings of sensors that are tared now, and returns the bitmap of those that were. In a contact that others measure it waits,
@@ -173,7 +173,7 @@ static void begin_contact(struct condition *condition, const struct conditioned 
   condition->strong_Pa_q10 = TAKEN_FACTOR * (taken + of_this);
   condition->strongest_Pa_q10 = 0;
   condition->reached_Pa_q10 = 0;
-  condition->calm.snapshots = 0;
+  condition->snapshot_times.count = 0;
 }
 
 static void end_contact(struct condition *condition) {
@@ -181,13 +181,13 @@ static void end_contact(struct condition *condition) {
   condition->drifted_Pa_q10 = larger(condition->drifted_Pa_q10, update_drift_in(condition->gate.pressed_ms));
 }
 
-static void watch_calm(struct condition *condition, const struct conditioned *conditioned, uint8_t count) {
+static void watch_idle(struct condition *condition, const struct conditioned *conditioned, uint8_t count) {
   struct snapshot snapshot;
-  const bool calm = !condition->gate.pressed && conditioned->tared && (condition->restless & conditioned->usable) == 0 &&
-                    condition->tared_ms >= CALM_AFTER_TARE_ms && condition->gate.released_ms >= CALM_AFTER_RELEASE_ms;
-  if (calm && calm_is_due(&condition->calm, condition->now_ms, &snapshot)) {
+  const bool idle = !condition->gate.pressed && conditioned->tared && (condition->restless & conditioned->usable) == 0 &&
+                    condition->tared_ms >= IDLE_AFTER_TARE_ms && condition->gate.released_ms >= IDLE_AFTER_RELEASE_ms;
+  if (idle && drift_snapshot_is_due(&condition->snapshot_times, condition->now_ms, &snapshot)) {
     for (uint8_t k = 0; k < count; k++) {
-      calm_take(&condition->sensor[k].drift, condition->sensor[k].baseline_Pa_q10, &snapshot);
+      drift_take(&condition->sensor[k].drift, condition->sensor[k].baseline_Pa_q10, &snapshot);
     }
   }
 }
@@ -305,6 +305,6 @@ void condition_frame(struct condition *condition, const struct frame *frame, con
   }
   condition->touched = conditioned->contact;
   conditioned->tared = readable != 0 && conditioned->usable == readable && (condition->below & conditioned->usable) == 0;
-  watch_calm(condition, conditioned, count);
+  watch_idle(condition, conditioned, count);
   conditioned->zero_doubtful = is_doubtful(condition, conditioned, peak, saturated);
 }

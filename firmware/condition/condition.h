@@ -9,11 +9,11 @@
  * - Taken: the mean of ZERO_TARE_FRAMES readings without the smallest and the largest; at rates below 16 Hz of three
  * and more.
  * - Settled: rubber and sensors warm up. A baseline that was just taken may be off by its spread, ZERO_COLD_Pa for a
- * sensor that was off or is another, ZERO_WARM_Pa for one that was calm before. While there is a spread the baseline takes over all
+ * sensor that was off or is another, ZERO_WARM_Pa for one that was steady before. While there is a spread the baseline takes over all
  * readings within it, and the gate is higher by it: a weaker touch is not seen. The spread fades by evidence, to three times what the
- * reading moves in a second. A calm sensor has none after two seconds, one that creeps after fifteen.
+ * reading moves in a second. A steady one has none after two seconds, one that creeps after fifteen.
  * - Followed: then the baseline moves at 0.5 Pa/s. A force that rises faster is no drift. In a contact it does not move,
- * except for the drift of the calm before it (calm.h), for an hour.
+ * except for the drift of the idle time before it (drift.h), for an hour.
  * - Taken again: a reading below what a release explains means that the baseline was taken under a press. The sensor is
  * tared again after ZERO_BELOW_s, or after half a second if it is far below. Rubber that bulged beside that press may be above its zero
  * then, which seems to be a contact: where a sensor is below by more than eight times what any is above, all are tared again.
@@ -52,8 +52,8 @@
  * - no contact, but a zero that has taken more than opens the gate, or has not settled to that */
 #pragma once
 
-#include "condition/calm.h"
 #include "condition/constants.h"
+#include "condition/drift.h"
 #include "frame/frame.h"
 
 #include <stdbool.h>
@@ -106,7 +106,7 @@ struct condition {
 
   sensor_map taring;     /* bitmap: tare_left is not 0 */
   sensor_map guessed;    /* bitmap: tared in a contact that others measure */
-  sensor_map restless;   /* bitmap: the baseline does not keep up, no calm */
+  sensor_map restless;   /* bitmap: the baseline does not keep up, not idle */
   sensor_map below;      /* bitmap: too far below zero */
   sensor_map firm;       /* bitmap: stronger than what the zero has wandered */
   sensor_map sudden;     /* bitmap: stronger than what may have crept up */
@@ -120,7 +120,7 @@ struct condition {
   int32_t strong_Pa_q10;                 /* a contact above it is more than its zeros may be off by */
   int32_t strongest_Pa_q10;              /* of this contact */
   struct gate gate;
-  struct calm calm;
+  struct snapshot_times snapshot_times;
 
   int32_t zero_Pa_q10[FT_MAX_SENSORS];          /* [sensor] 1/1024 Pa, as all here: baseline + remainder */
   int32_t faded_Pa_q10[FT_MAX_SENSORS];         /* of the remainder, in this contact, less what the rubber has kept of it */

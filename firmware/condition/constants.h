@@ -28,7 +28,7 @@
 #define TARE_WAITS_ms ((uint32_t)SECONDS(8)) /* for a contact of others to end: wrong zeros may make that contact */
 #define FOUND_OUT_ms ((uint32_t)SECONDS(5))  /* a lost state or a wrong temperature shows within it (readings.h) */
 #define ZERO_COLD_Pa 350                     /* spread after power-up; strips: twice 0.16 kPa of rise */
-#define ZERO_WARM_Pa 60                      /* spread of a sensor that was calm before; choice */
+#define ZERO_WARM_Pa 60                      /* spread of a sensor that was steady before; choice */
 
 /* Settling of the baseline. */
 #define SETTLE_ms MS(500)                         /* time constant of the spread; choice */
@@ -88,16 +88,16 @@
 #define CREPT_MAX_Pa 2500      /* of those 2 kPa and a quarter */
 #define TAKEN_FACTOR 3         /* a contact of 3 times what its zeros took is off by a third; at 4 a strip fails */
 
-/* Drift of a calm: the baseline's, from snapshots. */
+/* Drift in idle time: the baseline's, from snapshots. */
 #define SNAPSHOTS 8                                   /* of the baseline; after the eighth every other one goes */
 #define SNAPSHOT_ms ((uint32_t)SECONDS(4))            /* interval, at first */
 #define SNAPSHOT_LONGEST_ms ((uint32_t)SECONDS(64))   /* at last: 8 of them span 512 s */
-#define CALM_AFTER_TARE_ms ((uint32_t)SECONDS(3))     /* begin of a calm after a tare, */
-#define CALM_AFTER_RELEASE_ms ((uint32_t)SECONDS(60)) /* and after a contact: what rubber keeps goes slowly */
-#define CALM_LAG_Pa 2                                 /* and half a sigma: most that a calm reading is above the baseline */
-#define DRIFT_LEAST_s 8                               /* shorter calms show no drift */
+#define IDLE_AFTER_TARE_ms ((uint32_t)SECONDS(3))     /* begin of idle time after a tare, */
+#define IDLE_AFTER_RELEASE_ms ((uint32_t)SECONDS(60)) /* and after a contact: what rubber keeps goes slowly */
+#define IDLE_LAG_Pa 2                                 /* and half a sigma: most that an idle reading is above the baseline */
+#define DRIFT_LEAST_s 8                               /* shorter times show no drift */
 #define DRIFT_LONGEST_s 512                           /* longer ones count as this; range of the products */
-#define DRIFT_CHANGE_MAX_Pa 300                       /* of the baseline in a calm; range: 0.5 Pa/s for 512 s is less */
+#define DRIFT_CHANGE_MAX_Pa 300                       /* of the baseline in idle time; range: 0.5 Pa/s for 512 s is less */
 #define DRIFT_FASTEST_q12 1280                        /* 0.31 Pa/s: at more the baseline is too slow to know the drift after a minute */
 #define DRIFT_SD_mPa_s 250                            /* standard deviation of drifts; strips: 0.22 Pa/s at most */
 #define BASELINE_SD_mPa 1000                          /* of a change of the baseline between two snapshots */

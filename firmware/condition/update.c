@@ -201,7 +201,7 @@ static void hold(const struct step *step) {
   sensor->below_ms = 0;
   set_bit(&condition->below, step->k, false);
   if (condition->gate.pressed_ms < DRIFT_GOES_ON_ms) {
-    const int32_t drifted = calm_drift(&sensor->drift, step->ms);
+    const int32_t drifted = drift_in(&sensor->drift, step->ms);
     sensor->baseline_Pa_q10 += drifted;
     sensor->rests_Pa_q10 += drifted;
     condition->zero_Pa_q10[step->k] += drifted;
@@ -343,7 +343,7 @@ static void follow(const struct step *step) {
   sensor->rests_Pa_q10 += unsure ? baseline_moved : 0;
   set_zero(step, remainder, baseline_moved, sensor->baseline_Pa_q10 + remainder - before);
   condition->margin_Pa_q10[step->k] = (unsure ? 0 : band.margin_Pa_q10) + sensor->spread_Pa_q10;
-  set_bit(&condition->restless, step->k, size_of(above_baseline) > Pa_q10(CALM_LAG_Pa) + step->noise_Pa_q10 / 2);
+  set_bit(&condition->restless, step->k, size_of(above_baseline) > Pa_q10(IDLE_LAG_Pa) + step->noise_Pa_q10 / 2);
   watch_below(step, above_baseline, band.lowest_Pa_q10 - condition->gate.open_Pa_q10);
 }
 

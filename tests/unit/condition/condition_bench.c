@@ -75,7 +75,7 @@ void begin(uint32_t frame_period_us) {
   fill(AMBIENT);
 }
 
-void begin_calm(uint32_t frame_period_us) {
+void begin_idle(uint32_t frame_period_us) {
   begin(frame_period_us);
   run_s(60);
 }

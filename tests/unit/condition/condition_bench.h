@@ -34,7 +34,7 @@ void hold(int32_t peak, float seconds);
 void begin(uint32_t frame_period_us);
 
 /* Tared and warm. */
-void begin_calm(uint32_t frame_period_us);
+void begin_idle(uint32_t frame_period_us);
 
 /* pico_mux at OSR 1024, pico_parallel at 256, either at 8192, a rate that was set, and the least */
 enum { PERIODS = 5, FAST_PERIODS = 3 };

@@ -5,7 +5,7 @@
 TEST(test_gate_has_a_hysteresis_in_pascals_and_sigmas) {
   static const int32_t noises[] = {0, 16 * Pa / 10, 4 * Pa, 11 * Pa};
   for (size_t n = 0; n < sizeof noises / sizeof noises[0]; n++) {
-    begin_calm(4854);
+    begin_idle(4854);
     frame.noise_Pa_q10 = noises[n];
     int32_t open = 132 * Pa + 6 * noises[n], close = 90 * Pa + 4 * noises[n];
     const struct {
@@ -54,7 +54,7 @@ TEST(test_invalid_sensors_are_left_out) {
 }
 
 TEST(test_unsettled_readings_move_no_zero) {
-  begin_calm(4854);
+  begin_idle(4854);
   frame.doubtful = frame.unsettled = 1u << 7;
   frame.pressure_Pa_q10[7] += 100 * Pa;
   run_s(60);
@@ -66,7 +66,7 @@ TEST(test_unsettled_readings_move_no_zero) {
 
 /* It is a press only where others measure it too: one that is broken must not stop the others. */
 TEST(test_saturated_sensor_means_contact_and_is_left_out) {
-  begin_calm(4854);
+  begin_idle(4854);
   frame.saturated = 8;
   frame.pressure_Pa_q10[3] = INT32_MAX;
   run_s(10);
@@ -130,7 +130,7 @@ static void assert_condition_is(const struct condition *expected) { TEST_ASSERT_
 /* The zeros that an answer is sent with are those it was measured from. */
 TEST(test_what_the_answer_does_not_need_can_wait) {
   struct condition before;
-  begin_calm(1000);
+  begin_idle(1000);
   memcpy(&before, &condition, sizeof before);
   condition_follow(&condition, &frame, &conditioned);
   assert_condition_is(&before);

@@ -17,7 +17,7 @@ static struct frame frame;
 static struct {
   int32_t pressure[SENSORS], slope[SENSORS];
   int32_t left;
-  int32_t calm; /* changes so much less often */
+  int32_t steady; /* changes so much less often */
 } load;
 
 static int32_t bell(int32_t k, int32_t centre, int32_t peak) {
@@ -28,7 +28,7 @@ static int32_t bell(int32_t k, int32_t centre, int32_t peak) {
 
 /* Rest, a press, a slow drift of all, or of one sensor, for a while. */
 static void change_load(void) {
-  load.left = draw_between(10, 400) * load.calm;
+  load.left = draw_between(10, 400) * load.steady;
   int32_t kind = draw_between(0, 4), centre = draw_between(0, SENSORS - 1);
   int32_t peak = draw_between(100, 60000) * Pa;
   for (int32_t k = 0; k < SENSORS; k++) {
@@ -78,7 +78,7 @@ static uint32_t course(void) {
   const int32_t period_us = draw_between(700, 50000);
   memset(&frame, 0, sizeof frame);
   memset(&load, 0, sizeof load);
-  load.calm = ONE_IN(2) ? 10 : 1;
+  load.steady = ONE_IN(2) ? 10 : 1;
   frame.sensor_count = SENSORS;
   frame.t_us = draw();
   frame.noise_Pa_q10 = draw_between(1, 11) * Pa;

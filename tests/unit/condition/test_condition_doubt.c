@@ -3,7 +3,7 @@
 /* Where a strong press was meanwhile, it may be what remains of that. */
 TEST(test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
-    begin_calm(periods_us[i]);
+    begin_idle(periods_us[i]);
     frame.pressure_Pa_q10[3] += 3000 * Pa;
     watch_s(60, 0, 0);
     TEST_ASSERT_EQUAL_FLOAT(contact_s, unflagged_s);
@@ -22,7 +22,7 @@ TEST(test_a_weak_contact_that_outlasts_a_strong_one_is_in_doubt) {
 
 /* No release leaves a sensor so far below its zero. */
 TEST(test_a_contact_beside_a_sensor_far_below_its_zero_is_in_doubt) {
-  begin_calm(periods_us[0]);
+  begin_idle(periods_us[0]);
   press(20000 * Pa);
   run_s(1);
   frame.pressure_Pa_q10[14] -= 4500 * Pa;
@@ -46,7 +46,7 @@ static void press_in_steps(int32_t from, int32_t to, float seconds, float then_s
  * stays in doubt, and a strong press on it is none. */
 TEST(test_a_touch_that_a_zero_took_part_of_stays_in_doubt) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
-    begin_calm(periods_us[i]);
+    begin_idle(periods_us[i]);
     press_in_steps(0, 47000 * Pa, 0.2f, 4);
     press_in_steps(47000 * Pa, 0, 0.1f, 1.2f);
     press_in_steps(0, 5100 * Pa, 0.15f, 0);
@@ -73,7 +73,7 @@ TEST(test_presses_in_quick_succession_move_no_zero) {
   static const float falls_s[] = {0.05f, 0.1f, 0.2f, 0.4f};
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (size_t j = 0; j < sizeof falls_s / sizeof falls_s[0]; j++) {
-      begin_calm(periods_us[i]);
+      begin_idle(periods_us[i]);
       int32_t worst = 0;
       for (int touches = 0; touches < 10; touches++) {
         press_in_steps(0, 20000 * Pa, 0.1f, 0.2f);
@@ -88,7 +88,7 @@ TEST(test_presses_in_quick_succession_move_no_zero) {
 
 /* Sensors that felt nothing stand off by a share of what others felt. */
 TEST(test_far_sensors_stand_off_too) {
-  begin_calm(4854);
+  begin_idle(4854);
   frame.pressure_Pa_q10[7] = AMBIENT + 20000 * Pa;
   run_s(5);
   fill(AMBIENT);
@@ -100,7 +100,7 @@ TEST(test_far_sensors_stand_off_too) {
 
 /* A contact that is no stronger than the drift of its time is in doubt, and followed slowly. */
 TEST(test_weak_contact_for_long_is_in_doubt) {
-  begin_calm(17544);
+  begin_idle(17544);
   frame.pressure_Pa_q10[7] += 300 * Pa;
   watch_s(600, 0, 0);
   TEST_ASSERT_EQUAL_FLOAT(contact_s, unflagged_s);
@@ -115,7 +115,7 @@ TEST(test_weak_contact_for_long_is_in_doubt) {
 /* A zero that wanders makes a weak contact on it doubtful. */
 TEST(test_contact_on_a_wandering_zero_is_in_doubt) {
   for (int wanders = 0; wanders <= 1; wanders++) {
-    begin_calm(17544);
+    begin_idle(17544);
     for (int i = 0; i < 3; i++) {
       frame.pressure_Pa_q10[7] += 20000 * Pa;
       run_s(5);
@@ -136,7 +136,7 @@ TEST(test_contact_on_a_wandering_zero_is_in_doubt) {
 /* Some real sensors creep by 10 Pa/s for minutes: more than the zero may follow. */
 TEST(test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not) {
   for (int p = 0; p < FAST_PERIODS; p++) {
-    begin_calm(periods_us[p]);
+    begin_idle(periods_us[p]);
     watch_s(60, 10.0f, 1 << 3);
     TEST_ASSERT_GREATER_THAN(30.0f, contact_s);
     TEST_ASSERT_FLOAT_WITHIN(0.5f, 0.0f, unflagged_s);
@@ -151,7 +151,7 @@ TEST(test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not) {
     run_s((float)SENSORS * 0.064f);
     TEST_ASSERT_FALSE(conditioned.zero_doubtful);
 
-    begin_calm(periods_us[p]);
+    begin_idle(periods_us[p]);
     watch_s(30, 100.0f, 1 << 7); /* 0.02 N/s on 12 mm of rubber */
     TEST_ASSERT_GREATER_THAN(25.0f, contact_s);
     TEST_ASSERT_FLOAT_WITHIN(1.5f, 0.0f, unflagged_s - contact_s);
@@ -162,7 +162,7 @@ TEST(test_what_crept_up_is_in_doubt_and_what_is_sudden_is_not) {
 /* A zero taken under a press would be off by it. Wrong zeros may make a contact, so the wait has an end. */
 TEST(test_one_sensor_is_not_tared_in_a_contact_unless_that_lasts) {
   for (int lasts = 0; lasts < 2; lasts++) {
-    begin_calm(4854);
+    begin_idle(4854);
     hold(20000 * Pa, 0.5f);
     frame.renewed = 1u << 8;
     run(1);

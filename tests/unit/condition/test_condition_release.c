@@ -26,7 +26,7 @@ TEST(test_what_rubber_does_after_a_release_is_no_contact) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (size_t s = 0; s < sizeof shares / sizeof shares[0]; s++) {
       for (size_t t = 0; t < 3; t++) {
-        begin_calm(periods_us[i]);
+        begin_idle(periods_us[i]);
         hold(20000 * Pa, 5);
         release(shares[s], times_s[t], 40);
         TEST_ASSERT_EQUAL_FLOAT(0, unflagged_s);
@@ -51,7 +51,7 @@ TEST(test_a_force_left_after_a_release_is_flagged) {
   static const float shares[] = {0.03f, 0.06f, 0.1f};
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (size_t s = 0; s < 3; s++) {
-      begin_calm(periods_us[i]);
+      begin_idle(periods_us[i]);
       hold(20000 * Pa, 5);
       float flagged_s = 0;
       hold((int32_t)(shares[s] * 20000) * Pa, 0.2f);
@@ -62,7 +62,7 @@ TEST(test_a_force_left_after_a_release_is_flagged) {
       TEST_ASSERT_EQUAL_FLOAT(59, flagged_s);
     }
     /* More than an eighth is a contact without doubt. */
-    begin_calm(periods_us[i]);
+    begin_idle(periods_us[i]);
     hold(20000 * Pa, 5);
     press(3000 * Pa);
     watch_s(60, 0, 0);
@@ -73,7 +73,7 @@ TEST(test_a_force_left_after_a_release_is_flagged) {
 
 TEST(test_press_after_a_release_is_not_taken_for_a_remainder) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
-    begin_calm(periods_us[i]);
+    begin_idle(periods_us[i]);
     hold(20000 * Pa, 5);
     hold(0, 3);
     TEST_ASSERT_FALSE(conditioned.contact);
@@ -94,7 +94,7 @@ TEST(test_press_after_a_release_is_not_taken_for_a_remainder) {
 TEST(test_a_press_proves_the_zero_that_it_leaves) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (int more = 0; more <= 1; more++) {
-      begin_calm(periods_us[i]);
+      begin_idle(periods_us[i]);
       hold(20000 * Pa, 5);
       hold(600 * Pa, 10);
       TEST_ASSERT_TRUE(conditioned.zero_doubtful);
@@ -105,7 +105,7 @@ TEST(test_a_press_proves_the_zero_that_it_leaves) {
       TEST_ASSERT_FALSE(conditioned.contact);
       TEST_ASSERT_EQUAL(more, conditioned.zero_doubtful);
     }
-    begin_calm(periods_us[i]); /* A press that is in doubt itself proves nothing. */
+    begin_idle(periods_us[i]); /* A press that is in doubt itself proves nothing. */
     hold(20000 * Pa, 5);
     hold(600 * Pa, 10);
     press(2000 * Pa);
@@ -134,7 +134,7 @@ static void keep(int presses, float share, float time_constant_s, float seconds)
 /* It keeps a fifth, more than the band of others: a contact that goes on, unless it kept a lot before. */
 TEST(test_a_sensor_that_keeps_much_has_a_band_of_its_own) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
-    begin_calm(periods_us[i / 2]);
+    begin_idle(periods_us[i / 2]);
     keep(8, i % 2 ? 0.12f : 0.02f, 2, 10);
     keep(1, 0.2f, 60, 5);
     TEST_ASSERT_FLOAT_WITHIN(1, i % 2 ? 0 : 5, unflagged_s);
@@ -144,7 +144,7 @@ TEST(test_a_sensor_that_keeps_much_has_a_band_of_its_own) {
 /* A force that remains after presses, on all sensors, is not learnt as rubber's: a fifth of the next is a contact. */
 TEST(test_a_force_that_is_left_again_and_again_stays_a_force) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
-    begin_calm(periods_us[i / 2]);
+    begin_idle(periods_us[i / 2]);
     for (int n = 0; n < 10; n++) {
       hold(20000 * Pa, 5);
       hold((n > 0 || i % 2 ? 2000 : 0) * Pa, 3);
@@ -162,7 +162,7 @@ TEST(test_a_force_that_is_left_again_and_again_stays_a_force) {
 TEST(test_what_a_press_leaves_is_taken_back_by_the_next_or_fades_in_it) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
     const int sign = i % 2 ? 1 : -1;
-    begin_calm(periods_us[i / 2]);
+    begin_idle(periods_us[i / 2]);
     hold(20000 * Pa, 5);
     release(0.04f * (float)sign, 2, 1);
     const float left_Pa = 0.04f * (float)sign * (20000.0f * expf(-1.0f / 2.0f) - 8000.0f);
@@ -179,7 +179,7 @@ TEST(test_what_a_press_leaves_is_taken_back_by_the_next_or_fades_in_it) {
 TEST(test_what_many_presses_leave_fades_in_the_next_one_and_is_known_as_it_moves_on) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
     const float share = i % 2 ? 0.04f : -0.04f;
-    begin_calm(periods_us[i / 2]);
+    begin_idle(periods_us[i / 2]);
     for (int n = 0; n < 24; n++) {
       hold((n % 3 ? 3000 : 20000) * Pa, 0.5f);
       release(share * expf(-1.7f / 2 * (float)(n % 3)), 2, 1.2f);
@@ -197,7 +197,7 @@ TEST(test_what_many_presses_leave_fades_in_the_next_one_and_is_known_as_it_moves
 /* A sensor that is tared, in a press or after it, rests where it settles, by then 200 Pa higher. */
 TEST(test_a_sensor_that_settles_after_a_press_rests_there) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
-    begin_calm(periods_us[i / 2]);
+    begin_idle(periods_us[i / 2]);
     hold(20000 * Pa, 1);
     frame.renewed = i % 2 ? 1u << 7 : 0;
     run(1);
@@ -235,7 +235,7 @@ TEST(test_what_a_sensor_keeps_shows_after_the_press_alone) {
  * off by a tenth counts for more from then on, one that did not for less. Where a contact moves on, its pressure is right. */
 TEST(test_the_sd_of_what_rubber_keeps_is_learnt_from_what_stands_off) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
-    begin_calm(periods_us[i]);
+    begin_idle(periods_us[i]);
     TEST_ASSERT_EQUAL(0, condition.hysteresis_sd_Pa_q10[7]);
     hold(20000 * Pa, 3);
     TEST_ASSERT_INT32_WITHIN(30 * Pa, (int32_t)(0.02f * 20000 * (1.0f - expf(-1.0f))) * Pa, condition.hysteresis_sd_Pa_q10[7]);

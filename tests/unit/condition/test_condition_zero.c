@@ -97,7 +97,7 @@ static void assert_touch_of_is_seen(int32_t peak) {
   TEST_ASSERT_INT32_WITHIN(20 * Pa, peak, conditioned.peak_Pa_q10);
 }
 
-/* Of a pad that was off its zeros settle first; of one that was calm they are known at once. */
+/* Of a pad that was off its zeros settle first; of one that was steady they are known at once. */
 TEST(test_a_light_touch_is_seen_once_zeros_have_settled) {
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     begin(periods_us[i]);
@@ -127,7 +127,7 @@ TEST(test_one_disturbed_reading_moves_no_zero) {
   static const int32_t readings[] = {INT32_MIN, 0, AMBIENT - 300 * Pa, AMBIENT + 300 * Pa, INT32_MAX};
   for (size_t i = 0; i < sizeof readings / sizeof readings[0]; i++) {
     for (int at = 0; at < 14; at++) { /* when the sensor is tracked, too */
-      begin_calm(4854);
+      begin_idle(4854);
       run(at);
       frame.pressure_Pa_q10[7] = readings[i];
       run(1);
@@ -149,7 +149,7 @@ TEST(test_one_disturbed_reading_moves_no_zero) {
 TEST(test_zero_follows_any_drift_of_a_barometer) {
   for (size_t i = 0; i < 2 * PERIODS; i++) {
     const int sign = i % 2 ? 1 : -1;
-    begin_calm(periods_us[i / 2]);
+    begin_idle(periods_us[i / 2]);
     watch_s(900, 0.22f * (float)sign, 0x1249);
     TEST_ASSERT_EQUAL_FLOAT(0, contact_s);
     TEST_ASSERT_TRUE(conditioned.tared);
@@ -180,7 +180,7 @@ TEST(test_no_slow_force_is_taken_for_a_drift) {
   static const float slopes_Pa_s[] = {22, 12, 2.4f};
   for (size_t i = 0; i < PERIODS; i++) {
     for (size_t s = 0; s < 3; s++) {
-      begin_calm(periods_us[i]);
+      begin_idle(periods_us[i]);
       watch_s(4000 / slopes_Pa_s[s], slopes_Pa_s[s], 1u << 7);
       TEST_ASSERT_TRUE(conditioned.contact);
       TEST_ASSERT_TRUE(contact_s > 0.85f * 4000 / slopes_Pa_s[s] - 20);
@@ -195,7 +195,7 @@ TEST(test_no_slow_force_is_taken_for_a_drift) {
 TEST(test_what_compensation_costs_is_no_contact) {
   for (size_t i = 0; i < 2 * FAST_PERIODS; i++) {
     const int sign = i % 2 ? 1 : -1;
-    begin_calm(periods_us[i / 2]);
+    begin_idle(periods_us[i / 2]);
     for (int half_second = 0; half_second < 60; half_second++) {
       fill(AMBIENT + (half_second < 30 ? 0 : sign * 60 * Pa));
       watch_s(0.5f, 96, ALL);
@@ -229,14 +229,14 @@ TEST(test_other_changes_are_learnt_as_no_drift) {
     run_s(3000);
     TEST_ASSERT_INT32_WITHIN(10 * Pa, began, condition.zero_Pa_q10[7]);
 
-    begin_calm(periods_us[i]);
+    begin_idle(periods_us[i]);
     hold(20000 * Pa, 5);
     release(0.03f, 10, 58);
     began = condition.zero_Pa_q10[7];
     hold(10000 * Pa, 3000);
     TEST_ASSERT_INT32_WITHIN(10 * Pa, began, condition.zero_Pa_q10[7]);
   }
-  begin_calm(4854); /* nor a slow press */
+  begin_idle(4854); /* nor a slow press */
   watch_s(300, 12, 1u << 7);
   int32_t began = condition.zero_Pa_q10[7];
   run_s(3000);
@@ -245,7 +245,7 @@ TEST(test_other_changes_are_learnt_as_no_drift) {
 
 /* The press becomes the zero; after it the pad reads negative, says so, and is tared again. */
 TEST(test_tare_during_contact) {
-  begin_calm(4854);
+  begin_idle(4854);
   frame.pressure_Pa_q10[7] += 20000 * Pa;
   run(50);
   TEST_ASSERT_TRUE(conditioned.contact);
@@ -270,7 +270,7 @@ TEST(test_reading_below_zero_is_tared_anew_when_it_stays) {
   static const int32_t depths_Pa[] = {400, 900};
   for (size_t i = 0; i < FAST_PERIODS; i++) {
     for (size_t j = 0; j < 2; j++) {
-      begin_calm(periods_us[i]);
+      begin_idle(periods_us[i]);
       fill(AMBIENT - depths_Pa[j] * Pa);
       run_s(8);
       TEST_ASSERT_FALSE(conditioned.tared);
@@ -332,7 +332,7 @@ TEST(test_a_release_of_what_was_tared_is_no_contact) {
 }
 
 TEST(test_a_pause_changes_no_zero_in_a_contact) {
-  begin_calm(4854);
+  begin_idle(4854);
   hold(20000 * Pa, 3);
   condition_resume(&condition, 3600000);
   run_s(1);
@@ -348,7 +348,7 @@ TEST(test_a_pause_changes_no_zero_in_a_contact) {
 
 /* What is known of the rubber outlives a tare, and a sensor that comes back later waits for the contact's end. */
 TEST(test_a_tare_keeps_what_is_known) {
-  begin_calm(4854);
+  begin_idle(4854);
   condition.sensor[3].hysteresis_q16 = 8000;
   frame.valid = ALL & ~(1u << 14);
   condition_tare(&condition);

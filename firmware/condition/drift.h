@@ -1,4 +1,4 @@
-/* The drift of each sensor's baseline in a calm, in which nothing touches and every baseline keeps up: from snapshots of the
+/* The drift of each sensor's baseline in idle time, in which nothing touches and every baseline keeps up: from snapshots of the
  * baselines of all sensors. In a contact, where the baseline cannot follow, it goes on. */
 #pragma once
 
@@ -8,10 +8,10 @@
 #include <stdint.h>
 
 /* When the snapshots were taken, of all sensors at once. */
-struct calm {
+struct snapshot_times {
   uint32_t snapshot_ms[SNAPSHOTS];
   uint32_t interval_ms;
-  uint8_t snapshots;
+  uint8_t count;
 };
 
 /* Of one sensor. */
@@ -29,13 +29,13 @@ struct snapshot {
 };
 
 /* Whether a snapshot of all baselines is due, and which. */
-bool calm_is_due(struct calm *calm, uint32_t now_ms, struct snapshot *snapshot);
+bool drift_snapshot_is_due(struct snapshot_times *taken, uint32_t now_ms, struct snapshot *snapshot);
 
 /* Takes it of one sensor, and sets its drift. */
-void calm_take(struct drift *drift, int32_t baseline_Pa_q10, const struct snapshot *snapshot);
+void drift_take(struct drift *drift, int32_t baseline_Pa_q10, const struct snapshot *snapshot);
 
 /* By how much the baseline has drifted in this time. */
-static inline int32_t calm_drift(struct drift *drift, int32_t ms) {
+static inline int32_t drift_in(struct drift *drift, int32_t ms) {
   const int32_t drift_q16 = drift->rest_q16 + drift->drift_q16 * ms;
   drift->rest_q16 = (uint16_t)drift_q16;
   return drift_q16 >> 16;

@@ -1,4 +1,4 @@
-#include "condition/calm.h"
+#include "condition/drift.h"
 
 #include "port/divide.h"
 
@@ -7,26 +7,26 @@
 #define DRIFT_HALF_s2 ((BASELINE_SD_mPa / DRIFT_SD_mPa_s) * (BASELINE_SD_mPa / DRIFT_SD_mPa_s))
 
 /* When all slots are in use every other one goes, and the next come half as often; at last the oldest goes. */
-bool calm_is_due(struct calm *calm, uint32_t now_ms, struct snapshot *snapshot) {
-  if (calm->snapshots == 0) {
-    calm->interval_ms = SNAPSHOT_ms;
-  } else if (now_ms - calm->snapshot_ms[calm->snapshots - 1] < calm->interval_ms) {
+bool drift_snapshot_is_due(struct snapshot_times *taken, uint32_t now_ms, struct snapshot *snapshot) {
+  if (taken->count == 0) {
+    taken->interval_ms = SNAPSHOT_ms;
+  } else if (now_ms - taken->snapshot_ms[taken->count - 1] < taken->interval_ms) {
     return false;
   }
   snapshot->every = 0;
-  if (calm->snapshots == SNAPSHOTS) {
-    const bool oldest_goes = calm->interval_ms >= SNAPSHOT_LONGEST_ms;
+  if (taken->count == SNAPSHOTS) {
+    const bool oldest_goes = taken->interval_ms >= SNAPSHOT_LONGEST_ms;
     snapshot->first = oldest_goes ? 1 : 0;
     snapshot->every = oldest_goes ? 1 : 2;
-    calm->snapshots = oldest_goes ? SNAPSHOTS - 1 : SNAPSHOTS / 2;
-    calm->interval_ms *= snapshot->every;
-    for (uint8_t i = 0; i < calm->snapshots; i++) {
-      calm->snapshot_ms[i] = calm->snapshot_ms[snapshot->first + snapshot->every * i];
+    taken->count = oldest_goes ? SNAPSHOTS - 1 : SNAPSHOTS / 2;
+    taken->interval_ms *= snapshot->every;
+    for (uint8_t i = 0; i < taken->count; i++) {
+      taken->snapshot_ms[i] = taken->snapshot_ms[snapshot->first + snapshot->every * i];
     }
   }
-  snapshot->slot = calm->snapshots++;
-  calm->snapshot_ms[snapshot->slot] = now_ms;
-  snapshot->span_ms = (int32_t)(now_ms - calm->snapshot_ms[0]);
+  snapshot->slot = taken->count++;
+  taken->snapshot_ms[snapshot->slot] = now_ms;
+  snapshot->span_ms = (int32_t)(now_ms - taken->snapshot_ms[0]);
   return true;
 }
 
@@ -45,7 +45,7 @@ static void set_drift(struct drift *drift, int32_t baseline_Pa_q10, int32_t span
   drift->drift_q16 = is_drift ? (drift_q12 * weight_q12) >> 8 : 0;
 }
 
-void calm_take(struct drift *drift, int32_t baseline_Pa_q10, const struct snapshot *snapshot) {
+void drift_take(struct drift *drift, int32_t baseline_Pa_q10, const struct snapshot *snapshot) {
   for (uint8_t i = 0; snapshot->every != 0 && i < snapshot->slot; i++) {
     drift->snapshot_Pa_q10[i] = drift->snapshot_Pa_q10[snapshot->first + snapshot->every * i];
   }
