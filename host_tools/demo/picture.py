@@ -127,18 +127,18 @@ def image(screen, fonts):
 
 
 def png(screens, every_s):
-    """The bytes of a PNG; of several screens it repeats them for ever."""
+    """The bytes of a PNG; several screens repeat for ever; viewers of still pictures show the middle one."""
     fonts = {bold: ImageFont.truetype(str(FONTS / f"DejaVuSansMono{'-Bold' if bold else ''}.ttf"), 13) for bold in (False, True)}
     pictures = [image(screen, fonts) for screen in screens]
     together = Image.new("RGB", (pictures[0].width, sum(picture.height for picture in pictures)))
     for i, picture in enumerate(pictures):
         together.paste(picture, (0, i * picture.height))
     palette = together.quantize(COLOURS, dither=Image.Dither.NONE)
-    first, *others = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
-    durations_ms = [round(1000 * every_s)] * len(others) + [round(1000 * (every_s + LAST_s))]
-    moving = {"save_all": True, "append_images": others, "duration": durations_ms, "loop": 0} if others else {}
+    drawn = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    durations_ms = [round(1000 * every_s)] * (len(drawn) - 1) + [round(1000 * (every_s + LAST_s))]
+    moving = {"save_all": True, "append_images": drawn, "duration": durations_ms, "loop": 0, "default_image": True} if drawn[1:] else {}
     out = io.BytesIO()
-    first.save(out, format="PNG", optimize=True, **moving)
+    drawn[len(drawn) // 2].save(out, format="PNG", optimize=True, **moving)
     return out.getvalue()
 
 
