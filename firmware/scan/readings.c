@@ -106,13 +106,16 @@ static struct glance compensate(const struct readings *readings, const uint32_t 
   return glance;
 }
 
-static __attribute__((noinline, cold)) uint32_t moved_Pa(const struct readings *readings, const int32_t kept_Pa_q10[],
-                                                         uint8_t sensor_count) {
+static __attribute__((noinline, cold)) void follow_moves(struct readings *readings, const int32_t kept_Pa_q10[], uint8_t sensor_count) {
   uint32_t sum_Pa = 0;
   for (uint8_t k = 0; k < sensor_count; k++) {
     sum_Pa += size_of(difference(kept_Pa_q10[k], readings->vouched_Pa_q10[k])) >> 10;
   }
-  return sum_Pa;
+  readings->moved = readings->moved || readings->jolted || (sum_Pa > READINGS_MOVED_Pa && readings->frames >= READINGS_MOVED_FRAMES);
+  readings->asks = readings->asks || readings->moved || (sum_Pa > READINGS_MOVED_Pa / 2 && readings->frames >= READINGS_ASK_FRAMES);
+  if (readings->frames < READINGS_FRAMES_MAX) {
+    readings->frames++;
+  }
 }
 
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], sensor_map good, struct frame *frame) {
@@ -132,12 +135,7 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], s
       step + frame->sensor_count * noises >= READINGS_JOLT_Pa_q10) {
     left_out = look_closer(readings, frame, usable, last_Pa_q10, kept_Pa_q10);
   }
-  const uint32_t sum_Pa = readings->frames < READINGS_ASK_FRAMES ? 0 : moved_Pa(readings, kept_Pa_q10, frame->sensor_count);
-  readings->moved = readings->moved || readings->jolted || (sum_Pa > READINGS_MOVED_Pa && readings->frames >= READINGS_MOVED_FRAMES);
-  readings->asks = readings->asks || readings->moved || sum_Pa > READINGS_MOVED_Pa / 2;
-  if (readings->frames < READINGS_FRAMES_MAX) {
-    readings->frames++;
-  }
+  follow_moves(readings, kept_Pa_q10, frame->sensor_count);
   readings->counted = usable & ~left_out;
 
   const sensor_map valid = readings->counted & ~readings->unproven;
