@@ -176,7 +176,8 @@ class Account:
         if self._last and stamp.line != self._last[0].line:
             before, last = self._last
             went_us, passed_us = packet.t_us - last.t_us, (stamp.measured_ns - before.measured_ns) / 1000
-            restarted = abs(went_us - passed_us) > 1e5 + 1e-3 * abs(passed_us)
+            unsure_us = 1e5 + 1e-3 * abs(passed_us) + before.uncertainty_us + stamp.uncertainty_us
+            restarted = abs(went_us - passed_us) > unsure_us
             self.restarts += restarted
             if restarted:
                 self._last_frame = None
@@ -274,7 +275,7 @@ class Recording:
                     source.asked += 1
                     source.wanted = None  # judged again by what has come
                 elif source.must_answer or not self._ending and host_time.now_s() - source.status_s > STATUS_AGE_s:
-                    self._ask(source, f"{ROOT}/{source.serial}/status", "answer")
+                    self._ask(source, f"{ROOT}/{source.serial}/status", "answer" if source.must_answer else "status")
             except self._zenoh.ZError:
                 pass  # not now; asked once more
             self._ended.wait(ASK_s / 10 if source.wanted else ASK_s)

@@ -91,7 +91,7 @@ class Accounts(unittest.TestCase):
         for number in (1, 2, 5):
             self.offer(account, 1, number, sequence=100 + number)
         self.assertEqual(len(self.taken(account)), 2)
-        stamp = a_stamp(2, 1, 10**9 + 20_000)
+        stamp = a_stamp(2, 1, 10**9 + 720_000)._replace(uncertainty_us=8e5)  # its clock is hardly known yet
         account.offer(stamp, a_packet(120, 10**9 + 20_000), 0.0)
         self.assertEqual(self.taken(account), [])  # the first line may still be whole
         account.heard([(2, 1)], 0.0)
@@ -156,6 +156,14 @@ class Accounts(unittest.TestCase):
             account.heard([(2, 1)], 0.0)
             self.assertEqual(len(self.taken(account)), 2)
             self.assertEqual((account.lost, account.restarts, account.unread_frames), (0, 0, told))
+
+    def test_the_last_answer_is_to_a_question_of_the_end(self):
+        recording, source = recorder.Recording.__new__(recorder.Recording), recorder._Source("AAAA", 0, None)
+        recording._ending, recording._ask, source.status_s = False, mock.Mock(), -math.inf
+        recording._ended = mock.Mock(is_set=lambda: recording._ask.call_count == 2)
+        recording._ask.side_effect = lambda *_: setattr(source, "must_answer", True)  # the end begins meanwhile
+        recording._ask_on(source)
+        self.assertEqual([call.args[2] for call in recording._ask.mock_calls], ["status", "answer"])
 
     def test_damaged_messages_are_counted(self):
         recording = recorder.Recording.__new__(recorder.Recording)
