@@ -33,6 +33,7 @@ from mcap.reader import make_reader  # noqa: E402
 
 CHANCES = 120  # for each seed that chance damages
 FRAMES = 8
+LONG = 1_200_000  # bytes of a line, more than a reader takes
 FAR_lines = 70_000  # more than a reader lets wait for one before them
 VERSION_AT, TYPE_AT = 0, 1  # of a packet
 
@@ -140,6 +141,8 @@ def csv_cases(corpus, name, text, devices):
     for cut in (1, 20, len(lines[row])):
         add(f"torn_row_{cut}", text_of(lines[: row + 1])[:-cut])
     add("torn_blank", text + b"  ")
+    add("long_note", [*lines[:row], f"# {LONG * 'x'}", *lines[row:]])
+    add("header_of_commas", [*lines[:header], LONG * ",", *lines[header + 1 :]])
     add("blank_lines", [*lines[:row], "", " \t", *lines[row:]])
     add("blank_line_first", ["", *lines])
     add("indented", ["  " + line for line in lines], f"{name}_whole")

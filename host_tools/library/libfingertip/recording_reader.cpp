@@ -34,7 +34,7 @@ public:
     }
     const std::size_t filled = std::max(end, text.find_last_not_of(is_quoted ? ",;\t\"" : ",;\t") + 1);
     fill_ = line.number == 1 ? text.substr(filled) : fill_;
-    is_one_ = is_one_ || is_quoted || !fill_.empty();
+    is_one_ = is_one_ || (is_quoted && commas_ < 0) || !fill_.empty();
     if (is_quoted || text.rfind('#', 0) == 0) {
       const bool has_end = is_quoted ? std::count(text.begin(), text.end(), '"') % 2 == 0 : !fill_.empty();
       line.torn = line.torn && !(has_end && text.substr(filled) == fill_);
@@ -48,9 +48,9 @@ public:
       std::string row = plain(text);
       row.erase(std::remove_if(row.begin(), row.end(), [](char c) { return c == ' ' || c == '\t'; }), row.end());
       const auto commas = [&] { return std::count(row.begin(), row.end(), ','); };
-      while (!row.empty() && row.back() == ',' && (commas() > commas_ || row.find_first_not_of(',') == std::string::npos)) {
-        row.pop_back();
-      }
+      const std::size_t used = row.find_last_not_of(',') + 1,
+                        more = static_cast<std::size_t>(std::max<std::ptrdiff_t>(commas() - commas_, 0));
+      row.resize(used == 0 ? 0 : std::max(used, row.size() - more));
       is_one_ = is_one_ || row != text;
       commas_ = commas_ < 0 ? commas() : commas_;
       text = row;
@@ -85,9 +85,14 @@ public:
 
   bool next(Line &line) override {
     std::size_t end = block_.find(end_, at_);
-    while (end == std::string::npos && block_.size() - at_ <= LINE_MOST_bytes) {
+    while (end == std::string::npos && (number_ > 0 || part_.empty())) {
       begin_ += at_;
       block_.erase(0, std::exchange(at_, 0));
+      if (block_.size() > LINE_MOST_bytes) {
+        begin_ += block_.size();
+        part_ = part_.empty() ? std::exchange(block_, "") : part_;
+        block_.clear();
+      }
       char more[16384];
       const std::size_t length = block_.size(), count = bytes_->read(begin_ + length, more, sizeof more);
       if (count == 0) {
@@ -99,9 +104,11 @@ public:
       }
       end = block_.find(end_, length);
     }
-    line.torn = end == std::string::npos;
-    line.text.assign(block_, at_, line.torn ? end : end - at_);
-    at_ = line.torn ? block_.size() : end + 1;
+    const bool is_ended = end != std::string::npos;
+    line.text = part_.empty() ? block_.substr(at_, is_ended ? end - at_ : end) : std::exchange(part_, "");
+    at_ = is_ended ? end + 1 : block_.size();
+    const bool is_long = line.text.size() > LINE_MOST_bytes;
+    line.torn = is_long || !is_ended;
     line.number = number_ + 1;
     const bool is_there = !line.torn || !line.text.empty();
     number_ += is_there;
@@ -111,13 +118,16 @@ public:
     if (number_ == 1 && line.text.rfind(BYTE_ORDER_MARK, 0) == 0) {
       line.text.erase(0, BYTE_ORDER_MARK.size());
     }
-    spreadsheet_.restore(line);
+    if (!is_long) {
+      spreadsheet_.restore(line);
+    }
     return is_there;
   }
   Place place() override { return {static_cast<std::streamoff>(begin_ + at_), 0, number_}; }
   void go_to(const Place &place) override {
     begin_ = static_cast<std::uint64_t>(place.offset);
     block_.clear();
+    part_.clear();
     at_ = 0;
     number_ = place.number;
   }
@@ -128,6 +138,7 @@ private:
 
   std::unique_ptr<ByteSource> bytes_;
   std::string block_;       /* the part of them that begins at begin_; read until at_ */
+  std::string part_;        /* before it, of a line that is too long, whose rest is read over */
   std::uint64_t begin_ = 0; /* where it does */
   std::size_t at_ = 0;
   std::uint64_t number_ = 0;
@@ -228,7 +239,7 @@ std::string format_of(const std::string &path, const std::string &line) {
   std::string_view words = trim(line);
   std::string_view begin = FIRST_WORDS;
   if (words.substr(0, begin.size()) == begin) {
-    std::string format(words.substr(begin.size()));
+    std::string format(words.substr(begin.size(), 9));
     if (format != FORMAT_OF_ONE && format != FORMAT_OF_SEVERAL) {
       throw Error(ErrorCode::other_format, path + ":1: recording format \"" + format + "\" is unknown, " + FORMAT_OF_ONE + " and " +
                                                FORMAT_OF_SEVERAL + " are known");
@@ -382,8 +393,8 @@ bool RecordingReader::read_next() {
   }
   state_.line_number = line.number;
   try {
-    if (line.torn && !line.text.empty()) {
-      throw Damage{"the last line is torn"};
+    if (line.torn && !trim(line.text).empty()) {
+      throw Damage{"a line is torn, or longer than a megabyte"};
     }
     while (!line.text.empty() && line.text.back() == '\r') {
       line.text.pop_back(); /* of an MCAP file that was made of an editor's */

@@ -31,7 +31,7 @@ from .errors import InputError
 from .frames import Edge, frame_of
 from .line import CONTACT_COLUMNS, LATER_COLUMNS, RAW_COLUMNS, SENSORS_MAX, STAGES, Flag  # STAGES for readers of recordings
 from .mcap_recording import MAGIC, Contacts, Damaged, Line, LogClock, McapLineReader, Skipped
-from .recorded import JOINT_COLUMNS, OF_SPREADSHEETS, UNKNOWN_HEADER, Rows, counts_of, judge_key, packet_of, restored, serials_of
+from .recorded import JOINT_COLUMNS, UNKNOWN_HEADER, Rows, counts_of, judge_key, packet_of, restored, serials_of
 
 if TYPE_CHECKING:
     import pandas
@@ -98,7 +98,7 @@ def _check_kind(path: Path, lines: Sequence[str], kind: str, formats: Collection
     if begin or not number:
         raise InputError(f'{path}:1: no {kind}; its first line must be "# fingertip-{kind} 1"')
     if number not in formats:
-        raise InputError(f"{path}:1: {kind} format {number} is unknown; this tool reads format {' and '.join(formats)}")
+        raise InputError(f"{path}:1: {kind} format {number[:9]} is unknown; this tool reads format {' and '.join(formats)}")
     return number
 
 
@@ -278,7 +278,7 @@ class Recording:
 # Some 20 MB are read in a second: below this the wait is short.
 WORTH_WAITING_bytes = 10_000_000
 LATE_s = 1.0  # a row may come behind later ones by less than this
-HEADER_WITHIN_bytes = 200_000  # of a recording that a spreadsheet has saved
+HEAD_WITHIN_bytes = 1 << 20  # of a recording that a spreadsheet has saved
 BLOCK_bytes, ROWS_AT_ONCE = 500_000, 1024  # about the same; more take no less time each
 
 
@@ -332,7 +332,7 @@ class _RecordingLines:
         """The same, but rows, or what else is neither comment nor blank, many at a time."""
         try:
             with open(self.path, "rb") as file:
-                start = file.read(HEADER_WITHIN_bytes)
+                start = file.read(HEAD_WITHIN_bytes)
                 if start.startswith(MAGIC):
                     self.mcap = McapLineReader(self.path, self.progress, self.interval_s)
                     yield from self.mcap.items()
@@ -340,12 +340,12 @@ class _RecordingLines:
                 check_kind_of_file(self.path, start)
                 file.seek(3 if start.startswith(b"\xef\xbb\xbf") else 0)
                 source: Any = file
-                if (b"\r" in start and b"\n" not in start) or OF_SPREADSHEETS.search(start):
+                if (b"\r" in start and b"\n" not in start) or recorded.OF_SPREADSHEETS.match(start):
                     texts = file.read().decode("utf-8", "surrogateescape").split("\n" if b"\n" in start else "\r")
                     source = io.BytesIO("\n".join(restored(texts)).encode("utf-8", "surrogateescape"))
                 size, read, shown, number = os.fstat(file.fileno()).st_size, 0, 0, 1
                 while block := source.read(BLOCK_bytes):
-                    block += source.readline(1 << 20)  # a longer line is torn
+                    block += source.readline(recorded.LINE_MOST_bytes)
                     read += len(block)
                     if self.progress and size > WORTH_WAITING_bytes and read - shown > size // 100:
                         shown = read
@@ -354,18 +354,21 @@ class _RecordingLines:
                         block = re.sub(rb"\r+(?=\n|\Z)", b"", block)
                     letters = np.frombuffer(block, np.uint8)
                     begins = np.concatenate(([0], np.flatnonzero(letters[:-1] == ord("\n")) + 1, [len(block)]))
-                    is_row = ~np.isin(letters[begins[:-1]], list(b"# \t\n"))
-                    torn = not block.endswith(b"\n")
-                    is_row[-1] &= not torn
+                    torn = np.diff(begins) - 1 > recorded.LINE_MOST_bytes
+                    torn[-1] |= not block.endswith(b"\n")
+                    is_row = ~np.isin(letters[begins[:-1]], list(b'"# \t\n')) & ~torn
                     at = 0
                     for other in (*np.flatnonzero(~is_row).tolist(), len(is_row)):
                         if other > at:
                             yield Stretch(range(number + at, number + other), block[begins[at] : begins[other]])
                         if other < len(is_row):
                             text = block[begins[other] : begins[other + 1]].decode("utf-8", "surrogateescape")
-                            yield number + other, text.removesuffix("\n").lstrip(" \t"), torn and other + 1 == len(is_row)
+                            text = text.removesuffix("\n").lstrip(" \t")
+                            yield number + other, next(restored([text])) if text.startswith('"#') else text, bool(torn[other])
                         at = other + 1
                     number += len(is_row)
+                    while block and not block.endswith(b"\n"):  # the rest of a line that is too long
+                        block = source.readline(recorded.LINE_MOST_bytes)
         except OSError as error:
             raise InputError(f"{self.path}: {error.strerror}; check the path") from None
 
@@ -599,7 +602,7 @@ def read_recording(
             reading.take_rows(wrong)
         try:
             if torn and text:
-                raise ValueError("the last line is torn")
+                raise ValueError("a line is torn, or longer than a megabyte")
             reading.line(number, text)
         except ValueError as error:
             reading.take_rows(wrong)

@@ -46,9 +46,10 @@ _PACKETS["info"] = {"sequence": "H", "t_us": "Q"}
 
 JOINT_COLUMNS = "device,time_us,"
 UNKNOWN_HEADER = "unknown header: columns moved, renamed, missing, or added?"
-# A first line, a comment or a header, as spreadsheets save it.
+LINE_MOST_bytes = 1 << 20  # a longer one is read as torn
+# What a file begins with whose first line, a comment, or header a spreadsheet has saved.
 OF_SPREADSHEETS = re.compile(
-    rb'\A(?:\xef\xbb\xbf)?(?:"|[^\r\n]*[;,\t][\r\n])|^"#|^[ \t"]*(?:t_us|device)(?:[^\r\n]*[;\t" ]|[^\r\n]*,[\r\n])', re.M
+    rb'(?:\xef\xbb\xbf)?(?:"|[^\n]*[;,\t]\r*\n|(?:[ \t\r]*(?:#[^\n]*)?\n)*[ \t]*[^#\s](?:[^\n]*[;\t "]|[^\n]*,\r*\n))'
 )
 
 
@@ -68,7 +69,9 @@ def restored(lines: Iterable[str]) -> Iterator[str]:
         rest = text[quoted.end() :] if quoted else text
         kept = rest.rstrip(',;\t"' if quoted else ",;\t")
         fill, is_whole = rest[len(kept) :] if number == 0 else fill, False
-        if quoted or text.startswith("#"):
+        if len(text) > LINE_MOST_bytes:
+            pass
+        elif quoted or text.startswith("#"):
             is_whole = (text.count('"') % 2 == 0 if quoted else bool(fill)) and rest[len(kept) :] == fill
             if quoted:
                 text = quoted[1].replace('""', '"') + kept
@@ -78,8 +81,8 @@ def restored(lines: Iterable[str]) -> Iterator[str]:
         elif text.strip(" \t\r"):
             separator = next((c for c in text if c in ";\t" and "," not in text), ",") if commas < 0 else separator
             text = re.sub("[ \t]", "", _plain(text, separator))
-            while text.endswith(",") and (text.count(",") > commas or not text.strip(",")):
-                text = text[:-1]
+            used = len(text.rstrip(","))
+            text = text[: used and max(used, len(text) - max(0, text.count(",") - commas))]
             commas = text.count(",") if commas < 0 else commas
         yield text
     if is_whole:
