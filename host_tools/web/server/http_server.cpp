@@ -139,7 +139,7 @@ public:
     if (rest() > 0 || ends_) {
       return send_rest();
     }
-    return receive() && answer(headers, handler);
+    return (in_.size() > HEAD_BYTES + BODY_BYTES /* that came ahead */ || receive()) && answer(headers, handler);
   }
 
 private:

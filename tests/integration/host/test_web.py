@@ -16,6 +16,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -217,6 +218,11 @@ class Web(WebCase):
             ):
                 self.assertIn(self.attack(head, piece, 300)[9:12], (status, b""), head)
                 self.assertEqual(self.attack(head, piece[:20000], 1)[9:12], status, head)
+            with socket.create_connection((self.host, self.port)) as ahead:  # of its answers
+                threading.Thread(target=lambda: all(iter(lambda: ahead.recv(1 << 16), b""))).start()
+                for _ in range(300):
+                    ahead.sendall(125 * (b"HEAD / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: %b\r\n\r\n" % bytes(8000)))
+                ahead.shutdown(socket.SHUT_RDWR)
             slow_s = 0.0
             for ask in (b"", b"GET /", b"GET /assets/pad.bin HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 3):
                 for _ in range(300):
