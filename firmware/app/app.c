@@ -208,7 +208,6 @@ void app_run(struct app *app) {
   if (has_frame) {
     app_process_frame(app, taken_us);
     app->statistics.asleep_us += app->found.slept_us;
-    app->active = true;
   }
   const uint64_t now_us = port_now_us();
   each_second(app, now_us, has_frame);

@@ -39,7 +39,7 @@ struct statistics {
 
 struct app {
   uint32_t usb_events, close_count; /* of the port, in the last round */
-  bool active;                      /* the last round had something to do, so there may be more */
+  bool active;                      /* the last round had bytes of the host, so there may be more */
   bool saves_power;
   uint64_t saving_since_us; /* if .saves_power */
   struct tick tick;         /* shared with the event context, and so is .scan, under its own rules */
