@@ -89,7 +89,7 @@ static struct fit_settings with_dip(void) {
   return settings;
 }
 
-/* What follows needs `fit` of the same readings and the calls before, which are not counted. */
+/* What follows needs `fit` of the same readings and the calls before. */
 static void begin_tangential(void) { tangential_state = (struct fit_tangential_state){0}; }
 static void tangential(void) {
   const struct fit_settings settings = with_dip();
@@ -113,7 +113,7 @@ static void shapes(void) {
   fit_shapes_part(&layout, &shapes_pad, job.pressure_Pa_q10, &settings, &contact, &shapes_state, &shapes_result);
   answer(shapes_result.x_mm[0], shapes_result.y_mm[0]);
 }
-#define SHAPES_LATER (2 + (FIT_SHAPES_FRAMES - 2) * FIT_SHAPES_PARTS) /* parts before a frame that answers */
+#define SHAPES_CALLS (2 + (FIT_SHAPES_FRAMES - 1) * FIT_SHAPES_PARTS) /* to the first answer; a contact's first frame has two parts */
 
 #define RUN_ALTERNATIVE(name)                                                                                                              \
   static void name(void) {                                                                                                                 \
@@ -125,33 +125,24 @@ RUN_ALTERNATIVE(naive_double)
 RUN_ALTERNATIVE(lm_float)
 RUN_ALTERNATIVE(lm_double)
 
-/* The order is that of KERNELS in fit_on_chip.mjs. begin: after `fit`; calls: of run that are not counted. */
+/* The order is that of KERNELS in fit_on_chip.mjs. begin: after `fit`, not counted; calls: of run, each counted. */
 static const struct {
   void (*run)(void), (*begin)(void);
   int calls;
 } kernels[] = {
-    {nothing, NULL, 0},
-    {fit, NULL, 0},
-    {grid, NULL, 0},
-    {masked, NULL, 0},
-    {general, NULL, 0},
-    {naive_float, NULL, 0},
-    {naive_double, NULL, 0},
-    {lm_float, NULL, 0},
-    {lm_double, NULL, 0},
-    {tangential, begin_tangential, FIT_TANGENTIAL_FRAMES - 1},
-    {step_bias, begin_bias, 0},
-    {step_bias, begin_bias, 1},
-    {step_bias, begin_bias, 2},
-    {step_bias, begin_bias, 3},
-    {step_bias, begin_bias, 4},
-    {step_bias, begin_bias, 5},
-    {gains_of_touch, begin_gains, 0},
-    {shapes, begin_shapes, 0}, /* a contact's first frame */
-    {shapes, begin_shapes, 1},
-    {shapes, begin_shapes, SHAPES_LATER},
-    {shapes, begin_shapes, SHAPES_LATER + 1},
-    {shapes, begin_shapes, SHAPES_LATER + 2},
+    {nothing, NULL, 1},
+    {fit, NULL, 1},
+    {grid, NULL, 1},
+    {masked, NULL, 1},
+    {general, NULL, 1},
+    {naive_float, NULL, 1},
+    {naive_double, NULL, 1},
+    {lm_float, NULL, 1},
+    {lm_double, NULL, 1},
+    {tangential, begin_tangential, FIT_TANGENTIAL_FRAMES},
+    {step_bias, begin_bias, FIT_BIAS_PARTS},
+    {gains_of_touch, begin_gains, 1},
+    {shapes, begin_shapes, SHAPES_CALLS},
 };
 
 int main(void) {
@@ -178,10 +169,9 @@ int main(void) {
       kernels[job.kernel].begin();
     }
     for (int call = 0; call < kernels[job.kernel].calls; call++) {
+      CALL_DEBUGGER(CALL_START);
       run();
+      CALL_DEBUGGER(CALL_STOP);
     }
-    CALL_DEBUGGER(CALL_START);
-    run();
-    CALL_DEBUGGER(CALL_STOP);
   }
 }
