@@ -37,7 +37,7 @@ class Placement(NamedTuple):
 
 
 def bits_of(flags):
-    return int((1 << np.flatnonzero(flags)).sum())
+    return int.from_bytes(np.packbits(flags, bitorder="little").tobytes(), "little")
 
 
 class PlacementFinder:
@@ -53,7 +53,7 @@ class PlacementFinder:
 
     def take(self, reading):
         """The placement that this frame completes."""
-        frame = table_of([reading.pressure_Pa, reading.zero_Pa])
+        frame = np.array([reading.pressure_Pa, reading.zero_Pa], float)
         self._call("finder_take", self._finder, reading.t_s, bits_of(reading.valid), frame, self._state, self._found, self._levels)
         self.state, self.refusal = _STATES[self._state[0]], _REFUSALS[self._state[1]]
         if not self._state[2]:
