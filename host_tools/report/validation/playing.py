@@ -101,7 +101,7 @@ class Workshop(TwinPlayer):
         """And the Gaussian that comes closest to each pressure on the base."""
         pairs = sorted({(scenario.indenter, scenario.layer_mm) for scenario in self.scenarios})
         feet = {(WEIGHT_FOOT, scenario.layer_mm) for scenario in self.scenarios if scenario.calibrated is not None}
-        print(f"        contact tables: {len(pairs)} (the first time some five minutes)", flush=True)
+        print(f"        contact tables: {len(pairs)}", flush=True)
         self.solve(feet.union(pairs))
         for indenter, layer_mm in pairs:
             text = run(self.twin, "width", "--indenter", indenter, "--layer", layer_mm, "--cache", self.tables)

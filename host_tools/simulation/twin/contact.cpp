@@ -28,24 +28,26 @@ Grid grid_for(const Indenter &indenter, const Layer &layer) {
   return {nodes, step_mm};
 }
 
+// About the middle, with room between the images of what can touch for what each node does to each other.
+static Grid near_grid(const Indenter &indenter, const Grid &grid) {
+  const int reach = static_cast<int>(indenter.reach_mm() / grid.step_mm) + 1;
+  return {std::min((4 * reach + 16) / 16 * 16, grid.nodes), grid.step_mm};
+}
+
 struct ContactSolver::Work {
-  Grid grid;
-  std::size_t nodes2;
-  Transform transform;
-  std::vector<double> height_mm;  // of the indenter, infinite where it has no surface
-  std::vector<double> compliance; // mm per Pa of each wave, the transforms' norm in it
-  std::vector<double> transfer;   // to the base
-  std::vector<double> pressure_Pa;
-  double yield_mm_Pa; // of one node under its own pressure
+  Grid grid, near;
+  std::size_t nodes2, near2;
+  Transform transform, near_transform;
+  std::vector<double> height_mm;                   // of the indenter, infinite where it has no surface; near
+  std::vector<double> compliance, near_compliance; // mm per Pa of each wave, the transforms' norm in it
+  std::vector<double> transfer;                    // to the base
+  std::vector<double> pressure_Pa;                 // near
+  double yield_mm_Pa;                              // of one node under its own pressure
 
   Work(const Indenter &indenter, const Layer &layer, const Grid &g)
-      : grid(g), nodes2(std::size_t(g.nodes) * std::size_t(g.nodes)), transform(g.nodes), height_mm(nodes2), compliance(transform.waves()),
-        transfer(transform.waves()), pressure_Pa(nodes2, 0.0) {
-    for (int i = 0; i < g.nodes; i++) {
-      for (int j = 0; j < g.nodes; j++) {
-        height_mm[at(i, j)] = indenter.profile_mm((i - g.nodes / 2) * g.step_mm, (j - g.nodes / 2) * g.step_mm);
-      }
-    }
+      : grid(g), near(near_grid(indenter, g)), nodes2(std::size_t(g.nodes) * std::size_t(g.nodes)),
+        near2(std::size_t(near.nodes) * std::size_t(near.nodes)), transform(g.nodes), near_transform(near.nodes), height_mm(near2),
+        compliance(transform.waves()), transfer(transform.waves()), pressure_Pa(near2, 0.0) {
     const double unit = 2.0 * M_PI / (g.nodes * g.step_mm); // per mm
     const double nu = layer.poisson, norm = 1.0 / static_cast<double>(nodes2);
     const double of_layer = 2.0 * (1.0 - nu * nu) / layer.youngs_modulus_Pa;
@@ -61,12 +63,24 @@ struct ContactSolver::Work {
         transfer[n] = norm * base_transfer(k * h, nu);
       }
     }
-    pressure_Pa.front() = 1.0;
-    yield_mm_Pa = transform.apply(pressure_Pa, compliance)[0];
-    pressure_Pa.front() = 0.0;
+    std::vector<double> one(nodes2, 0.0), answer_mm(near2);
+    one.front() = 1.0;
+    const double *sunk_mm = transform.apply(one, compliance);
+    yield_mm_Pa = sunk_mm[0];
+    for (int i = 0; i < near.nodes; i++) {
+      for (int j = 0; j < near.nodes; j++) {
+        const std::size_t n = std::size_t(i) * std::size_t(near.nodes) + std::size_t(j);
+        height_mm[n] = indenter.profile_mm((i - near.nodes / 2) * g.step_mm, (j - near.nodes / 2) * g.step_mm);
+        answer_mm[n] = sunk_mm[at(near_transform.i_of(i), near_transform.i_of(j))];
+      }
+    }
+    near_compliance = near_transform.response_of(answer_mm);
   }
 
-  std::size_t at(int i, int j) const { return std::size_t(i) * std::size_t(grid.nodes) + std::size_t(j); }
+  // The node i, j from [0][0]; of the periodic grid.
+  std::size_t at(int i, int j) const {
+    return std::size_t((i + grid.nodes) % grid.nodes) * std::size_t(grid.nodes) + std::size_t((j + grid.nodes) % grid.nodes);
+  }
 };
 
 ContactSolver::ContactSolver(const Indenter &indenter, const Layer &layer, const Grid &grid)
@@ -82,14 +96,14 @@ Contact ContactSolver::solve(double force_N) {
   Work &w = *work_;
   const double area_m2 = 1e-6 * w.grid.step_mm * w.grid.step_mm;
   std::vector<double> &p = w.pressure_Pa;
-  std::vector<double> gap(w.nodes2), direction(w.nodes2, 0.0);
+  std::vector<double> gap(w.near2), direction(w.near2, 0.0);
 
   double sum = 0.0;
   for (double value : p) {
     sum += value;
   }
   if (sum <= 0.0) { // anywhere that can touch at all
-    for (std::size_t n = 0; n < w.nodes2; n++) {
+    for (std::size_t n = 0; n < w.near2; n++) {
       p[n] = std::isfinite(w.height_mm[n]) ? 1.0 : 0.0;
       sum += p[n];
     }
@@ -101,10 +115,10 @@ Contact ContactSolver::solve(double force_N) {
   double before = 1.0, approach_mm = 0.0;
   bool conjugate = false;
   for (int step = 1; step <= STEPS_MAX; step++) {
-    const double *sunk_mm = w.transform.apply(p, w.compliance);
+    const double *sunk_mm = w.near_transform.apply(p, w.near_compliance);
     double mean = 0.0;
     std::size_t touching = 0;
-    for (std::size_t n = 0; n < w.nodes2; n++) {
+    for (std::size_t n = 0; n < w.near2; n++) {
       gap[n] = sunk_mm[n] + w.height_mm[n];
       if (p[n] > 0.0) {
         mean += gap[n];
@@ -114,23 +128,23 @@ Contact ContactSolver::solve(double force_N) {
     mean /= static_cast<double>(touching);
     approach_mm = mean;
     double square = 0.0;
-    for (std::size_t n = 0; n < w.nodes2; n++) {
+    for (std::size_t n = 0; n < w.near2; n++) {
       gap[n] -= mean;
       square += p[n] > 0.0 ? gap[n] * gap[n] : 0.0;
     }
     const double share = conjugate ? square / before : 0.0;
     before = square;
-    for (std::size_t n = 0; n < w.nodes2; n++) {
+    for (std::size_t n = 0; n < w.near2; n++) {
       direction[n] = p[n] > 0.0 ? gap[n] + share * direction[n] : 0.0;
     }
-    const double *answer_mm = w.transform.apply(direction, w.compliance);
+    const double *answer_mm = w.near_transform.apply(direction, w.near_compliance);
     double mean_response = 0.0;
-    for (std::size_t n = 0; n < w.nodes2; n++) {
+    for (std::size_t n = 0; n < w.near2; n++) {
       mean_response += p[n] > 0.0 ? answer_mm[n] : 0.0;
     }
     mean_response /= static_cast<double>(touching);
     double along = 0.0, curvature = 0.0;
-    for (std::size_t n = 0; n < w.nodes2; n++) {
+    for (std::size_t n = 0; n < w.near2; n++) {
       if (p[n] > 0.0) {
         along += gap[n] * direction[n];
         curvature += (answer_mm[n] - mean_response) * direction[n];
@@ -141,7 +155,7 @@ Contact ContactSolver::solve(double force_N) {
     double change = 0.0;
     conjugate = true;
     sum = 0.0;
-    for (std::size_t n = 0; n < w.nodes2; n++) {
+    for (std::size_t n = 0; n < w.near2; n++) {
       const double old = p[n];
       if (p[n] > 0.0) {
         p[n] = std::max(0.0, p[n] - length * direction[n]);
@@ -158,12 +172,14 @@ Contact ContactSolver::solve(double force_N) {
       value *= scale;
     }
     if (change * area_m2 < SETTLED * force_N && conjugate) {
-      Contact contact{force_N, approach_mm, 0.0, step, p, std::vector<double>(w.nodes2)};
-      for (double value : p) {
-        contact.contact_area_mm2 += value > 0.0 ? w.grid.step_mm * w.grid.step_mm : 0.0;
+      Contact contact{force_N, approach_mm, 0.0, step, std::vector<double>(w.nodes2, 0.0), {}};
+      const int from = w.grid.nodes / 2 - w.near.nodes / 2;
+      for (std::size_t n = 0; n < w.near2; n++) {
+        contact.contact_area_mm2 += p[n] > 0.0 ? w.grid.step_mm * w.grid.step_mm : 0.0;
+        contact.pressure_Pa[w.at(from + static_cast<int>(n) / w.near.nodes, from + static_cast<int>(n) % w.near.nodes)] = p[n];
       }
-      const double *base_Pa = w.transform.apply(p, w.transfer);
-      std::copy(base_Pa, base_Pa + w.nodes2, contact.base_Pa.begin());
+      const double *base_Pa = w.transform.apply(contact.pressure_Pa, w.transfer);
+      contact.base_Pa.assign(base_Pa, base_Pa + w.nodes2);
       return contact;
     }
   }

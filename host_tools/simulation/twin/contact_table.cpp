@@ -43,8 +43,7 @@ double ContactTable::contact_radius_mm(double force_N) const {
   return force_N > 0.0 ? ForcePlanes::between_forces(radius_mm_, force_N) : 0.0;
 }
 
-ContactTable ContactTable::load_or_build(const Indenter &indenter, const Layer &layer, const std::filesystem::path &cache_directory,
-                                         const std::function<void(double)> &on_progress) {
+ContactTable ContactTable::load_or_build(const Indenter &indenter, const Layer &layer, const std::filesystem::path &cache_directory) {
   const Grid grid = grid_for(indenter, layer);
   char name[64];
   std::snprintf(name, sizeof name, "%s-h%g", indenter.name.c_str(), layer.thickness_mm);
@@ -64,9 +63,6 @@ ContactTable ContactTable::load_or_build(const Indenter &indenter, const Layer &
       }
       values[VALUES + std::size_t(f)] = static_cast<float>(contact.indentation_mm);
       values[VALUES + FORCES + std::size_t(f)] = static_cast<float>(std::sqrt(contact.contact_area_mm2 / M_PI));
-      if (on_progress) {
-        on_progress((f + 1.0) / FORCES);
-      }
     }
     file.write(values);
   }

@@ -10,7 +10,6 @@
 #include "simulation/twin/force_planes.hpp"
 
 #include <filesystem>
-#include <functional>
 #include <vector>
 
 namespace fingertip::twin {
@@ -20,10 +19,9 @@ public:
   static constexpr double FORCE_MIN_N = ForcePlanes::FORCE_MIN_N;
   static constexpr double FORCE_MAX_N = ForcePlanes::FORCE_MAX_N;
 
-  // From the cache if it holds this very table, else solved (half a minute at most) and kept there; a damaged file is solved again.
-  // on_progress gets the share done, 0..1. Throws std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
-  static ContactTable load_or_build(const Indenter &indenter, const Layer &layer, const std::filesystem::path &cache_directory,
-                                    const std::function<void(double)> &on_progress = {});
+  // From the cache if it holds this very table, else solved (some seconds at most) and kept there; a damaged file is solved again.
+  // Throws std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
+  static ContactTable load_or_build(const Indenter &indenter, const Layer &layer, const std::filesystem::path &cache_directory);
 
   // On the base, by dx, dy from the middle of the contact, along the indenter's own axes.
   double base_pressure_Pa(double force_N, double dx_mm, double dy_mm) const { return pressure_.at(force_N, dx_mm, dy_mm); }

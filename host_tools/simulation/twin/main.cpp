@@ -16,7 +16,6 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
-#include <mutex>
 #include <thread>
 
 namespace {
@@ -68,7 +67,7 @@ Layer layer_of(double thickness_mm) {
   return silicone(thickness_mm);
 }
 
-// There and open to new tables, which take long to solve.
+// There and open to new tables.
 std::filesystem::path cache_of(const Options &options) {
   const std::filesystem::path cache = options.cache.empty() ? default_cache_directory() : std::filesystem::path(options.cache);
   std::error_code error;
@@ -105,7 +104,6 @@ int tables(const Options &options) {
   struct Job {
     const Indenter *indenter;
     Layer layer;
-    double share = 0.0;
   };
   std::vector<Job> jobs;
   for (double thickness_mm : options.layers_mm) {
@@ -120,30 +118,14 @@ int tables(const Options &options) {
     }
   }
   const std::filesystem::path cache = cache_of(options);
-  ProgressBar bar("contact tables");
-  std::mutex telling;
-  const auto make = [&](std::size_t i) {
-    const auto report = [&](double share) {
-      const std::lock_guard<std::mutex> lock(telling);
-      jobs[i].share = share;
-      double sum = 0.0;
-      for (const Job &job : jobs) {
-        sum += job.share;
-      }
-      show(bar, sum / static_cast<double>(jobs.size()));
-    };
-    ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache, report);
-    const std::lock_guard<std::mutex> lock(telling);
-    jobs[i].share = 1.0; // without a word: it may have been there
-  };
+  const auto make = [&](std::size_t i) { ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache); };
   in_parallel(jobs.size(), make, std::max(1u, std::thread::hardware_concurrency()));
   std::printf("%zu contact tables in %s\n", jobs.size(), cache.string().c_str());
   return 0;
 }
 
 ContactTable table_of(const std::string &name, const Layer &layer, const Options &options) {
-  ProgressBar bar("contact table of " + name + ", once");
-  return ContactTable::load_or_build(indenter(name), layer, cache_of(options), [&](double share) { show(bar, share); });
+  return ContactTable::load_or_build(indenter(name), layer, cache_of(options));
 }
 
 int width(const Options &options) {

@@ -61,4 +61,14 @@ const double *Transform::apply(const std::vector<double> &field, const std::vect
   return apply_any(field, response);
 }
 
+std::vector<double> Transform::response_of(const std::vector<double> &field) {
+  std::copy(field.begin(), field.end(), plans_->real);
+  fftw_execute(plans_->forward);
+  std::vector<double> response(waves());
+  for (std::size_t n = 0; n < waves(); n++) {
+    response[n] = plans_->spectrum[n][0] / static_cast<double>(field.size());
+  }
+  return response;
+}
+
 } // namespace fingertip::twin

@@ -20,6 +20,8 @@ public:
   // field: [x][y]. The response holds the norm, 1 / nodes^2. The result stays until the next call.
   const double *apply(const std::vector<double> &field, const std::vector<double> &response);
   const double *apply(const std::vector<double> &field, const std::vector<std::complex<double>> &response);
+  // The response, real, that answers a 1 at [0][0] alone with this field, which is even.
+  std::vector<double> response_of(const std::vector<double> &field);
 
 private:
   template <typename Response> const double *apply_any(const std::vector<double> &field, const Response &response);
