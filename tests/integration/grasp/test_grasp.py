@@ -86,14 +86,14 @@ class GraspTest(WorldCase):
         """Lines of standard output up to the one that tells this state."""
         return self.told(process, f" s  {state} ")
 
-    def told(self, process, words):
-        """The same, up to the line with these words."""
-        lines = []
-        while line := process.readline():
+    def told(self, process, words, limit_s=60):
+        """The same, up to the line with these words, within so much of the world's time."""
+        lines, end_s = [], self.world.now_s + limit_s
+        while self.world.now_s < end_s and (line := process.readline()):
             lines.append(line)
             if words in line:
                 return lines
-        self.fail((words, lines, process.communicate()))
+        self.fail((words, lines, process.read("stderr")))
 
     def rows(self):
         return grip_file.read_grip(self.csv)
