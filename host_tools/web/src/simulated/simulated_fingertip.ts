@@ -9,11 +9,11 @@ import type { FromWorker, ToWorker } from './worker';
 
 /** What may press on the pad, in the order of the file of objects (host_tools/web/tables/objects_of_twin.cpp); mass_g: when it is dropped. */
 const OBJECTS = [
-  { name: 'sphere15', title: 'weight on a ball of 15 mm', mass_g: 300 },
+  { name: 'sphere15', title: 'ball of 15 mm, 300 g', mass_g: 300 },
   { name: 'sphere6', title: 'ball of 6 mm', mass_g: 100 },
   { name: 'cube12', title: 'cube of 12 mm', mass_g: 100 },
   { name: 'cube24', title: 'plate of 24 mm', mass_g: 200 },
-  { name: 'cylinder24', title: 'cylinder on its side, 24 mm', mass_g: 200 },
+  { name: 'cylinder24', title: 'lying cylinder, 24 mm', mass_g: 200 },
   { name: 'lime', title: 'lime', mass_g: 70 },
 ];
 /** Of the pad, as `twin scenario --effects`: gains as cast. */
