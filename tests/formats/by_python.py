@@ -88,11 +88,11 @@ def numbers(fields):
 def recording(path, salvage, device, part=None):
     from_s, to_s, _ = part or (0, math.inf, 0)
     found = read_recording(path, salvage=salvage, serial=device or None, from_s=from_s, to_s=to_s)
-    rows = []
+    rows, columns = [], {name: found[name] for name in ("t_us", "frame", "sequence", "raw_sequence", *CONTACT, *RAW_COLUMNS)}
     for i in range(len(found["t_us"])):
 
         def value(name):
-            return float(found[name][i])
+            return float(columns[name][i])
 
         parts = []
         if not math.isnan(value("sequence")):
