@@ -349,11 +349,15 @@ struct FirmwareFit {
   bool usable_array = false;
 };
 
-/* Whether the firmware's fit, if it knows of the dip, locates a press that is as the solution has it ASTRAY_PITCHES off
- * anywhere on the array: where few sensors measure a press, a dip makes a second solution. */
-bool goes_astray(const Array &array, const Solution &s) {
+/* Whether the firmware's fit, if it knows of the dip, locates the placements (rms), or a press that is as the solution has it anywhere on
+ * the array, ASTRAY_PITCHES off: where few sensors measure a press, a dip makes a second solution. */
+bool goes_astray(const Array &array, const std::vector<Placement> &placements, const Solution &s) {
   constexpr double STEPS = 4.0; /* of a pitch */
-  FirmwareFit fit(array, {s.sigma_mm, shape_of(s).sigma_sd_mm, s.dip_share, s.dip_sd_mm});
+  const Shape shape{s.sigma_mm, shape_of(s).sigma_sd_mm, s.dip_share, s.dip_sd_mm};
+  if (scatter(array, placements, s, s.gain, shape).location_rms_mm > ASTRAY_PITCHES * array.pitch_mm) {
+    return true;
+  }
+  FirmwareFit fit(array, shape);
   const auto [left, right] = std::minmax_element(array.x_mm.begin(), array.x_mm.end());
   const auto [bottom, top] = std::minmax_element(array.y_mm.begin(), array.y_mm.end());
   const std::vector<double> ones(array.sensors(), 1.0);
@@ -391,7 +395,7 @@ Judgement judge(const Array &array, std::vector<Placement> placements, bool last
   Judgement j;
   j.solution = solve(array, placements);
   const Solution &s = j.solution;
-  if (s.solved && goes_astray(array, s)) {
+  if (s.solved && goes_astray(array, placements, s)) {
     j.solution.dip_share = j.solution.dip_sd_mm = 0.0;
   }
   j.kept = s;
@@ -539,7 +543,7 @@ Scatter scatter(const Array &array, const std::vector<Placement> &placements, co
     sum += std::abs(std::log(each / force));
     each = std::abs(each / force - 1.0);
   }
-  return {median(distances), median(forces), sum / double(forces.size())};
+  return {median(distances), rms(distances), median(forces), sum / double(forces.size())};
 }
 
 } // namespace fingertip::calibrating

@@ -118,10 +118,10 @@ std::optional<ForceScale> force_scale(const Array &array, const std::vector<Plac
                                       double force_N, const Shape &shape);
 
 /* What a calibration is for: how far the firmware's fit scatters over the placements, with these gains and this shape.
- * Medians: of the distance of its locations from those of the solution, less what all have in common, of the force's
- * deviation from its median, relative; and the mean of its log's, in which the few that are far off count. */
+ * Median and rms of the distance of its locations from those of the solution, less what all have in common; median of the force's
+ * deviation from its median, relative, and the mean of its log's, in which the few that are far off count. */
 struct Scatter {
-  double location_mm = 0.0, force = 0.0, force_mean = 0.0;
+  double location_mm = 0.0, location_rms_mm = 0.0, force = 0.0, force_mean = 0.0;
 };
 Scatter scatter(const Array &array, const std::vector<Placement> &placements, const Solution &solution, const std::vector<double> &gain,
                 const Shape &shape);

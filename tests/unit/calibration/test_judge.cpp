@@ -13,9 +13,9 @@ using test::KnownPad;
 using State = Judgement::State;
 
 /* Of thirty placements, each made by `press` on pad and placements of this seed. */
-static Judgement judged(std::uint64_t seed, const std::function<KnownPad::Press(Random &random, int i)> &press,
-                        const std::function<void(Placement &placement, int i)> &change = {}, std::size_t count = 30) {
-  const KnownPad pad(seed);
+static std::vector<Placement> session(const KnownPad &pad, std::uint64_t seed, std::size_t count,
+                                      const std::function<KnownPad::Press(Random &random, int i)> &press,
+                                      const std::function<void(Placement &placement, int i)> &change = {}) {
   Random random(seed, 5, 0);
   std::vector<Placement> placements;
   for (int i = 0; i < static_cast<int>(count); i++) {
@@ -24,7 +24,13 @@ static Judgement judged(std::uint64_t seed, const std::function<KnownPad::Press(
       change(placements.back(), i);
     }
   }
-  return judge(pad.array, placements, true);
+  return placements;
+}
+
+static Judgement judged(std::uint64_t seed, const std::function<KnownPad::Press(Random &random, int i)> &press,
+                        const std::function<void(Placement &placement, int i)> &change = {}, std::size_t count = 30) {
+  const KnownPad pad(seed);
+  return judge(pad.array, session(pad, seed, count, press, change), true);
 }
 
 static KnownPad::Press within(Random &random, double x_mm, double low_mm, double high_mm) {
@@ -101,27 +107,21 @@ TEST(Judge, names_a_sensor_without_readings_before_long) {
 
 TEST(Judge, names_a_sensor_that_measures_nothing) {
   for (std::uint64_t seed = 62; seed < 72; seed++) {
-    const KnownPad pad(seed);
-    auto placements = good_session(pad, 20, seed);
-    for (Placement &placement : placements) {
-      placement.reading_Pa[seed % 15] = 0.0;
-    }
-    expect_refused(judge(pad.array, placements, true), Reason::silent, "sensors " + std::to_string(seed % 15) + " measured nothing");
+    const auto silence = [&](Placement &placement, int) { placement.reading_Pa[seed % 15] = 0.0; };
+    expect_refused(judged(seed, anywhere, silence, 20), Reason::silent, "sensors " + std::to_string(seed % 15) + " measured nothing");
   }
 }
 
 /* Saturated wherever it has a load: a reading that is no measurement, as the finder leaves it, is not one of nothing. */
 TEST(Judge, does_not_take_what_a_sensor_missed_for_nothing) {
   for (std::uint64_t seed = 62; seed < 72; seed++) {
-    const KnownPad pad(seed);
-    auto placements = good_session(pad, 30, seed);
-    for (Placement &placement : placements) {
+    const auto saturate = [](Placement &placement, int) {
       if (placement.reading_Pa[7] > 0.2 * KnownPad::PEAK_Pa) {
         placement.usable &= ~(1u << 7);
         placement.reading_Pa[7] = 0.0;
       }
-    }
-    EXPECT_NE(judge(pad.array, placements, true).reason, Reason::silent) << seed;
+    };
+    EXPECT_NE(judged(seed, anywhere, saturate).reason, Reason::silent) << seed;
   }
 }
 
@@ -183,14 +183,8 @@ TEST(Judge, refuses_with_the_reason) {
 TEST(Judge, keeps_what_many_placements_determine) {
   KnownPad pad(73);
   pad.dip = 0.05;
-  Random random(73, 5, 0);
-  std::vector<Placement> placements;
   for (std::size_t count : {32u, 44u}) {
-    while (placements.size() < count) {
-      KnownPad::Press press = anywhere(random);
-      press.width_mm = 2.4;
-      placements.push_back(pad.place(press, 4.0 * double(placements.size()), random));
-    }
+    const auto placements = session(pad, 73, count, with(&KnownPad::Press::width_mm, 2.4, 2.4));
     const Judgement judgement = judge(pad.array, placements, true);
     EXPECT_EQ(judgement.state, State::good) << judgement.text;
     EXPECT_STREQ(name_of(judgement.reason), "unsure");
@@ -201,6 +195,16 @@ TEST(Judge, keeps_what_many_placements_determine) {
     EXPECT_EQ(judgement.kept.dip_share, 0.0);
     EXPECT_GT(solve(pad.array, placements).dip_share, 0.01);
   }
+}
+
+/* Presses as the solution has them are located well with this dip, the placements are not. */
+TEST(Judge, keeps_no_dip_with_which_placements_go_astray) {
+  KnownPad pad(5, 0.05);
+  pad.dip = 0.07;
+  pad.dip_mm = 10.0;
+  const auto placements = session(pad, 5, 24, with(&KnownPad::Press::width_mm, 2.8, 2.8));
+  EXPECT_EQ(judge(pad.array, placements, true).kept.dip_share, 0.0);
+  EXPECT_GT(solve(pad.array, placements).dip_share, 0.05);
 }
 
 /* Of sensors that are alike: nothing of the gains, the places and the own widths. */
