@@ -7,17 +7,11 @@ from reporting import built, run
 
 
 class TwinPlayer:
-    """tables: the folder of the contact tables; solve() those that several jobs need, so that none is solved twice."""
+    """tables: the folder of the contact tables."""
 
     def __init__(self, build, tables):
         self.twin, self.player = (built(build, "host_tools/simulation", tool) for tool in ("twin/twin", "player/fingertip_player"))
         self.tables = tables
-
-    def solve(self, pairs):
-        """pairs: of an indenter and the layer under it, mm."""
-        for layer_mm in sorted({layer for _, layer in pairs}):
-            names = ",".join(sorted({name for name, layer in pairs if layer == layer_mm}))
-            run(self.twin, "tables", "--indenter", names, "--layer", layer_mm, "--cache", self.tables)
 
     def write(self, path, kind, effects, seed, seconds, *more):
         options = ("--effects", effects or "none", "--seed", seed, "--seconds", seconds, "--cache", self.tables, "-o", path, "--overwrite")

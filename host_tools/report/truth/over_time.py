@@ -162,7 +162,6 @@ def figures(options, kinds=KINDS):
         raise InputError("--pads needs at least one pad")
     player, steps = TwinPlayer(options.build, pathlib.Path(options.build) / "contact_tables"), Steps()
     seeds = [(SEED if options.seed is None else options.seed) + i for i in range(options.pads or PADS)]
-    player.solve({(name, kind.pads.layer_mm) for kind in kinds for name in (kind.object, FOOT)})
     of_pads = {kind.pads: f"calibrated, as for {kind.name}" for kind in reversed(kinds) if kind.pads.calibrated}
     one = lambda pads: [calibrated(player, pads, seed) for seed in seeds]
     found = steps.run_all({pads: (what, lambda pads=pads: one(pads)) for pads, what in of_pads.items()})

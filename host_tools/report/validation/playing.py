@@ -26,7 +26,6 @@ FORCE_MIN_N = 1.0
 STIFF_LAYER_mm = 6
 PRIOR_WIDTH_mm = 0.5
 SECONDS_MIN = 40  # of a scenario that is made shorter: one contact of each kind at least
-WEIGHT_FOOT = "sphere15"  # of twin scenario placements
 WEIGHT_N, SESSION_s, SESSION_RATE_Hz, SESSIONS_MAX = 3, 200, 50, 5  # of a calibration
 OTHER_PLACES = 1000  # added to a seed: the same pad, other places
 
@@ -97,12 +96,9 @@ class Workshop(TwinPlayer):
         for pad in range(1, pads + 1):
             self.add(what, kind, indenter, seconds=seconds / pads, pad=pad, effects=effects, **more)
 
-    def build_tables(self):
-        """And the Gaussian that comes closest to each pressure on the base."""
+    def fit_gaussians(self):
+        """The Gaussian that comes closest to each pressure on the base."""
         pairs = sorted({(scenario.indenter, scenario.layer_mm) for scenario in self.scenarios})
-        feet = {(WEIGHT_FOOT, scenario.layer_mm) for scenario in self.scenarios if scenario.calibrated is not None}
-        print(f"        contact tables: {len(pairs)}", flush=True)
-        self.solve(feet.union(pairs))
         for indenter, layer_mm in pairs:
             text = run(self.twin, "width", "--indenter", indenter, "--layer", layer_mm, "--cache", self.tables)
             widths = {name: float(value) for name, value in (word.split("=") for word in text.split())}

@@ -420,7 +420,7 @@ def main(argv):
     out = output_folder(options)
     shop = Workshop(options, out)
     plan(shop)
-    shop.build_tables()
+    shop.fit_gaussians()
     steps = Steps()
     seconds = shop.play_all(steps)
     print("        the image on the emulated chip", flush=True)

@@ -1,7 +1,6 @@
 // twin: writes scenarios that emulator and native pipeline play. Exit status: 0 done; 1 something
 // went wrong, reported in one line; 2 wrong usage.
 #include "libfingertip/error.hpp"
-#include "libfingertip/in_parallel.hpp"
 #include "libfingertip/output_file.hpp"
 #include "libfingertip/progress_bar.hpp"
 #include "libfingertip/text.hpp"
@@ -16,7 +15,6 @@
 #include <cstdio>
 #include <exception>
 #include <functional>
-#include <thread>
 
 namespace {
 
@@ -32,8 +30,6 @@ struct Options {
   std::string output;
   bool overwrite = false;
   std::string cache;
-  std::vector<std::string> indenters;
-  std::vector<double> layers_mm;
   std::optional<double> shore_a; // default: that of silicone()
   double width_force_N = 2.0;
 };
@@ -96,31 +92,6 @@ int list() {
     std::printf("  %-14s%s; %s %s. %s\n", effect.name.c_str(), effect.description.c_str(), number(effect.usual).c_str(),
                 effect.unit.c_str(), effect.source.c_str());
   }
-  return 0;
-}
-
-// All pairs, on as many threads as there are processors.
-int tables(const Options &options) {
-  struct Job {
-    const Indenter *indenter;
-    Layer layer;
-  };
-  std::vector<Job> jobs;
-  for (double thickness_mm : options.layers_mm) {
-    const Layer layer = layer_of(thickness_mm);
-    if (options.indenters.empty()) {
-      for (const Indenter &one : indenters()) {
-        jobs.push_back({&one, layer});
-      }
-    }
-    for (const std::string &name : options.indenters) {
-      jobs.push_back({&indenter(name), layer});
-    }
-  }
-  const std::filesystem::path cache = cache_of(options);
-  const auto make = [&](std::size_t i) { ContactTable::load_or_build(*jobs[i].indenter, jobs[i].layer, cache); };
-  in_parallel(jobs.size(), make, std::max(1u, std::thread::hardware_concurrency()));
-  std::printf("%zu contact tables in %s\n", jobs.size(), cache.string().c_str());
   return 0;
 }
 
@@ -194,15 +165,6 @@ int main(int argc, char **argv) {
   };
 
   app.add_subcommand("list", "Explain scenarios, indenters, layers and effects")->callback([&] { action = list; });
-
-  CLI::App *build = app.add_subcommand("tables", "Compute the contact tables that are not cached");
-  option(build, "--indenter", options.indenters, "NAME,...", "Only of these; default: all")->delimiter(',');
-  option(build, "--layer", options.layers_mm, "MM,...", "On layers of these thicknesses; default: 12,6")
-      ->delimiter(',')
-      ->default_val(std::vector<double>{12.0, 6.0})
-      ->default_str("");
-  with_cache(build);
-  build->callback([&] { action = [&] { return tables(options); }; });
 
   ScenarioOptions &s = options.scenario;
   const auto with_contact = [&](CLI::App *command) {

@@ -220,11 +220,6 @@ class Usage(TwinTest):
         for word in ("sphere6", "cube24", "rubber_duck", "relaxation", "hysteresis", "clip", "rolloff", "Shore"):
             self.assertIn(word, out)
 
-    def test_tables_are_built_once(self):
-        out, err = self.run_twin("tables", "--indenter", "sphere6", "--layer", "12", "--cache", TABLES)
-        self.assertEqual(out, f"1 contact tables in {TABLES}\n")
-        self.assertEqual(err, "")
-
     def test_width_is_that_of_the_layer(self):
         out, _ = self.run_twin("width", "--indenter", "sphere6", "--layer", "12", "--cache", TABLES)
         found = dict(word.split("=") for word in out.split())
@@ -249,11 +244,6 @@ class Usage(TwinTest):
         os.remove(self.csv)
         self.assertIn("played.truth.csv: exists already", self.scenario_error("taps", "--seconds", "5"))
         self.scenario("taps", "--seconds", "5", "--overwrite")
-
-    def test_wrong_words_are_told_before_a_table_is_solved(self):
-        for arguments in (("glide",), ("taps", "--seconds", "0"), ("taps", "--force", "x")):
-            self.error("scenario", *arguments, "-o", self.csv, "--cache", str(self.folder / "cache"))
-            self.assertFalse((self.folder / "cache").exists())
 
     def test_the_help_is_the_same_for_everybody(self):
         out, _ = self.run_twin("scenario", "--help", env={**os.environ, "XDG_CACHE_HOME": "/somewhere/else"})
