@@ -17,6 +17,8 @@ constexpr double ROOM_THICKNESSES = 3.0;
 constexpr int STEPS_MAX = 2000;
 // Change of the pressure in one step, relative to the force.
 constexpr double SETTLED = 1e-7;
+// Of gaps, relative to the approach: a solution settles at 1e-6, rounding leaves 1e-15.
+constexpr double EVEN = 1e-12;
 
 Grid grid_for(const Indenter &indenter, const Layer &layer) {
   const double half_mm = std::max(TABLE_REACH_mm, indenter.reach_mm()) + ROOM_THICKNESSES * layer.thickness_mm;
@@ -150,8 +152,8 @@ Contact ContactSolver::solve(double force_N) {
         curvature += (answer_mm[n] - mean_response) * direction[n];
       }
     }
-    // One node alone has no neighbour to share with, but those that overlap shall still join.
-    const double length = curvature > 0.0 ? along / curvature : 1.0 / w.yield_mm_Pa;
+    // Of gaps that are even but for rounding, as that of one node alone, a length is noise; but those that overlap shall still join.
+    const double length = std::sqrt(square) > EVEN * mean ? along / curvature : 1.0 / w.yield_mm_Pa;
     double change = 0.0;
     conjugate = true;
     sum = 0.0;
