@@ -23,7 +23,7 @@ struct frame {
   sensor_map restored;                     /* bitmap: a reset brought back its state, or it stepped alone, since the frame before */
   sensor_map valid;                        /* bitmap: pressure is a measurement */
   sensor_map doubtful;                     /* bitmap: valid, but there is reason to doubt the reading */
-  sensor_map unsettled;                    /* bitmap: doubtful until the next temperature settles it */
+  sensor_map unsettled;                    /* bitmap: doubtful until the next temperature and another code */
   sensor_map saturated;                    /* bitmap: beyond the range in which the sensor reads true */
   int32_t pressure_Pa_q10[FT_MAX_SENSORS]; /* [sensor]; 0 where not valid */
 };

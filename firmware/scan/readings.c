@@ -144,10 +144,11 @@ bool readings_take_pressures(struct readings *readings, const uint32_t code[], s
       frame->pressure_Pa_q10[k] = valid >> k & 1u ? frame->pressure_Pa_q10[k] : 0;
     }
   }
+  const sensor_map doubt = readings->moved ? ~(sensor_map)0 : readings->still & (frame->unsettled | ~frame->valid);
   frame->valid = valid;
   frame->saturated &= valid;
-  frame->doubtful = readings->moved ? valid : valid & readings->doubtful;
-  frame->unsettled = readings->moved ? valid : valid & readings->doubted;
+  frame->doubtful = valid & (readings->doubtful | doubt);
+  frame->unsettled = valid & (readings->doubted | doubt);
   frame->renewed = readings->renewed;
   readings->renewed = 0;
   frame->restored = readings->restored;

@@ -2,7 +2,7 @@
  *
  * Temperatures. A value follows each sensor's, no faster than a pad warms (warmed_cC). A temperature that is READINGS_MOVED_cC from it is
  * not used, so that a supply that sags slowly is found as well. The last one stays in use, the sensor is doubtful, and the next one is
- * asked for at once: each degree is worth some 240 Pa. Two of them that agree come from a sensor that has lost its state, whatever the
+ * asked for at once: each degree is worth some 240 Pa. Two of them in a row come from a sensor that has lost its state, whatever the
  * others do. So does one after a jolt (see Moves). The sensor becomes a suspect. The first
  * temperature of a sensor must be near the others', but after a reset near its own last: it may have lost its state
  * again, and so may most others (supplies that dip once do so twice). If resets do not help for a second, and it reports
@@ -12,8 +12,8 @@
  * and 2.7 degC. So only a temperature vouches for pressures that have moved. It is asked for once all sensors together have moved by
  * half of READINGS_MOVED_Pa since the last one. If it comes too late, they are used, but all of them are doubtful until it comes. So they
  * are when one of them moves by READINGS_JOLT_Pa_q10 at once, or has lost its admission. While a temperature moves by half of
- * READINGS_MOVED_cC, or a code is that of the frame before, the doubt lasts. Codes that are off while the temperature's are right look
- * like a force: only the fit's residual shows them.
+ * READINGS_MOVED_cC the doubt lasts. A code that is that of the frame before is no other reading, and as doubtful as it was there. Codes
+ * that are off while the temperature's are right look like a force: only the fit's residual shows them.
  *
  * Pressures. A pressure below zero is left out. A second in a row makes the sensor a suspect. A large step of one
  * sensor alone is left out as well, since rubber passes any press on to its neighbours. If the next reading is back,
@@ -38,7 +38,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Two temperatures of a sensor that has lost its state, or those before and after its reset: it warms by less meanwhile. */
+/* Temperatures before and after a reset, or after two that did not help: a sensor warms by less meanwhile. */
 #define READINGS_TEMPERATURE_SAME_cC 100
 /* Sensors of one pad at rest: two parts of +-2 degC, and a warm object at one end. Further off,
  * a temperature must agree with a second one, no more. */
@@ -130,6 +130,6 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
  * otherwise. That takes effect with the next temperature; a new doubt does so at once. */
 void readings_doubt(struct readings *readings, sensor_map apart);
 
-/* Fills in pressures, valid, doubtful, unsettled, saturated, renewed and restored. code: [sensor];
+/* Fills in pressures, valid, doubtful, unsettled, saturated, renewed and restored. The frame still holds the one before. code: [sensor];
  * good: bitmap. Returns whether it left any out: left_out and perhaps suspects have changed. Cost: some 140 Cortex-M0+ cycles a sensor. */
 bool readings_take_pressures(struct readings *readings, const uint32_t code[], sensor_map good, struct frame *frame);

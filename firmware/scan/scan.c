@@ -548,7 +548,7 @@ bool scan_take(struct scan *scan, struct frame *frame) {
     use_temperature(scan, &scan->temperature_slot);
     if (is_frame) {
       fill_head(scan, temperature, frame);
-      frame->doubtful = frame->valid & scan->readings.doubtful;
+      frame->doubtful |= frame->valid & scan->readings.doubtful;
     }
     report(scan);
     hand_over(&scan->temperature_state, SCAN_SLOT_EMPTY);

@@ -30,13 +30,12 @@ static int32_t find_middle(const int32_t value[], sensor_map which) {
 }
 
 /* Whether to use a temperature. */
-static bool settle(struct readings *readings, uint8_t k, int32_t now_cC, int32_t middle_cC, int32_t warmed_cC) {
+static __attribute__((noinline)) bool settle(struct readings *readings, uint8_t k, int32_t now_cC, int32_t middle_cC, int32_t warmed_cC) {
   sensor_map bit = sensor_bit(k);
   bool possible = now_cC >= TEMPERATURE_MIN_cC && now_cC <= TEMPERATURE_MAX_cC;
   bool near = possible && (middle_cC == NO_MIDDLE || within(now_cC - middle_cC, READINGS_TEMPERATURE_NEAR_cC));
   bool agrees = (readings->doubted & bit) && within(now_cC - readings->doubted_cC[k], READINGS_TEMPERATURE_SAME_cC);
-  bool use;
-  bool insists; /* reports it again, and it cannot be */
+  bool use, insists; /* reports it again, and it cannot be */
   if (!(readings->has_thermal & bit)) {
     const bool pardoned = readings->pardoned & bit, known = readings->known & bit;
     const bool kept = known ? within(now_cC - readings->thermal[k].first_order_cC, READINGS_TEMPERATURE_SAME_cC) : near;
@@ -47,7 +46,7 @@ static bool settle(struct readings *readings, uint8_t k, int32_t now_cC, int32_t
     const int32_t beyond_cC = within(off_cC, warmed_cC) ? 0 : off_cC < 0 ? off_cC + warmed_cC : off_cC - warmed_cC;
     use = within(beyond_cC, READINGS_MOVED_cC);
     readings->steady_cC[k] = use ? now_cC - beyond_cC : readings->steady_cC[k];
-    insists = !use && (agrees || readings->jolted);
+    insists = !use && ((readings->doubted & bit) || readings->jolted);
     readings->has_last &= insists && readings->asks ? ~bit : ~(sensor_map)0; /* no evidence any more */
   }
   if (!use) {
@@ -121,7 +120,7 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
   const int32_t middle_cC = find_middle(now_cC, readings->has_thermal | taken->good);
   uint32_t news = 0;
   int32_t sum_cC = 0, used = 0;
-  sensor_map left = readings->counted & (readings->still | ~taken->good); /* in doubt as before */
+  sensor_map left = readings->counted & ~taken->good; /* in doubt as before */
   for (uint8_t k = 0; k < sensor_count; k++) {
     const sensor_map bit = sensor_bit(k);
     if (!(taken->good & bit)) {
@@ -150,7 +149,6 @@ uint32_t readings_take_temperature(struct readings *readings, uint8_t sensor_cou
   readings->moved = readings->asks = readings->asks && left && readings->doubts_in_a_row < HASTY_DOUBTS_MAX;
   readings->doubtful = taken->prom_bad | readings->doubted | readings->strange | readings->apart |
                        compare(readings, sensor_count, readings->has_thermal & taken->good & ~readings->doubted, now_cC);
-  readings->doubtful |= readings->moved ? ~(sensor_map)0 : 0;
   readings->temperature_cC = (int16_t)(used > 0 ? port_divide(sum_cC, used) : readings->temperature_cC);
   memcpy(readings->vouched_Pa_q10, readings->last_Pa_q10[readings->newest], sizeof readings->vouched_Pa_q10);
   readings->frames = readings->frames > READINGS_MOVED_FRAMES ? (uint8_t)(readings->frames - READINGS_MOVED_FRAMES) : 0;
