@@ -80,11 +80,11 @@ class Fit(unittest.TestCase):
             with self.assertRaisesRegex(MeasureError, "knows no none: it is of another version than this package"):
                 of_other_version("none")
         finder, found, solved = np.zeros(1, np.int64), MEASURE.made("found_placement", 1), MEASURE.made("solved_placements", 1)
-        kept = MEASURE.made("calibration", 1), MEASURE.made("calibrated_sensor", 42)
+        kept, done = (MEASURE.made("calibration", 1), MEASURE.made("calibrated_sensor", 42)), np.zeros(3, np.int64)
         MEASURE.call("finder_new", 15, finder)
         for name, *values in (
             ("finder_new", 42, finder),
-            ("finder_take", int(finder[0]), 0.0, 0, np.zeros((2, 14)), np.zeros(3, np.int64), found, np.zeros((2, 15))),
+            ("finder_take", int(finder[0]), np.zeros(1), done[:1], np.zeros((2, 14)), done, found, np.zeros((2, 15))),
             ("solve_placements", np.arange(42.0), np.zeros(42), 9.0, 3.0, found, np.ones((1, 2, 42)), solved, np.zeros((2, 42)), *kept),
         ):
             with self.assertRaisesRegex(MeasureError, "number of sensors"):

@@ -88,13 +88,19 @@ class Library:
         return found
 
     def call(self, name, *values):
-        values = [
-            value.encode() if isinstance(value, str) else str(value).encode() if isinstance(value, pathlib.Path) else value
-            for value in values
-        ]
+        self.prepare(name, *values)()
+
+    def prepare(self, name, *values):
+        """The call as a function, which takes what these arrays hold when it is called."""
+        values = [str(value).encode() if isinstance(value, (str, pathlib.Path)) else value for value in values]
         arguments = (Argument * len(values))(*(argument_of(value) for value in values))
-        if self._known(name, getattr(self.library, f"measure_{name}", None))(arguments, ctypes.c_int64(len(values))):
-            raise MeasureError(self.library.measure_failure().decode())
+        entry, count = self._known(name, getattr(self.library, f"measure_{name}", None)), ctypes.c_int64(len(values))
+
+        def run(_kept=values):
+            if entry(arguments, count):
+                raise MeasureError(self.library.measure_failure().decode())
+
+        return run
 
     def made(self, record, *shape):
         """A new array of such records, all zeros."""
@@ -126,9 +132,9 @@ def usable_of(readings):
 
 
 class Firmware(Library):
-    def call(self, name, *values):
+    def prepare(self, name, *values):
         """None: no deviations of sensors."""
-        super().call(name, *(self.made("fit_deviation", 0, 0) if value is None else value for value in values))
+        return super().prepare(name, *(self.made("fit_deviation", 0, 0) if value is None else value for value in values))
 
     @property
     def constants(self):

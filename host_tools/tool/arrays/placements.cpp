@@ -35,14 +35,14 @@ MEASURE_ENTRY(finder_free)
 
 // frame: pressures and zeros, [2][sensor]. state: State, Refusal, and whether this frame completes a placement; then found, and its
 // readings and rest in levels, [2][sensor].
-static void finder_take(std::int64_t finder, double t_s, std::int64_t valid, Batch<const double, 2> frame, Batch<std::int64_t, 1> state,
-                        Batch<found_placement, 1> found, Batch<double, 2> levels) {
+static void finder_take(std::int64_t finder, Batch<const double, 1> t_s, Batch<const std::int64_t, 1> valid, Batch<const double, 2> frame,
+                        Batch<std::int64_t, 1> state, Batch<found_placement, 1> found, Batch<double, 2> levels) {
   auto &placements = *reinterpret_cast<PlacementFinder *>(static_cast<std::intptr_t>(finder));
   const std::size_t sensors = placements.above_Pa().size();
   require(frame.size() == 2 && frame.size(1) == sensors && levels.size() == 2 && levels.size(1) == sensors, "another number of sensors");
-  require(state.size() == 3 && found.size() == 1, "no room for what is found");
+  require(t_s.size() == 1 && valid.size() == 1 && state.size() == 3 && found.size() == 1, "another number of values");
   const auto row = [&](std::size_t i) { return std::vector<double>(frame.row(i), frame.row(i) + frame.size(1)); };
-  const auto placement = placements.take({t_s, static_cast<sensor_map>(valid), row(0), row(1)});
+  const auto placement = placements.take({t_s[0], static_cast<sensor_map>(valid[0]), row(0), row(1)});
   state[0] = static_cast<std::int64_t>(placements.state());
   state[1] = static_cast<std::int64_t>(placements.refusal());
   state[2] = placement.has_value();

@@ -46,15 +46,18 @@ class PlacementFinder:
     def __init__(self, sensors):
         library, finder = firmware(), np.zeros(1, np.int64)
         library.call("finder_new", sensors, finder)
-        self._call, self._finder = library.call, int(finder[0])
-        weakref.finalize(self, library.call, "finder_free", self._finder)
+        weakref.finalize(self, library.call, "finder_free", int(finder[0]))
+        self._t_s, self._valid, self._frame = np.zeros(1), np.zeros(1, np.int64), np.zeros((2, sensors))
         self._state, self._found, self._levels = np.zeros(3, np.int64), library.made("found_placement", 1), np.zeros((2, sensors))
+        arrays = self._t_s, self._valid, self._frame, self._state, self._found, self._levels
+        self._take = library.prepare("finder_take", int(finder[0]), *arrays)
         self.state, self.refusal = "resting", None
 
     def take(self, reading):
         """The placement that this frame completes."""
-        frame = np.array([reading.pressure_Pa, reading.zero_Pa], float)
-        self._call("finder_take", self._finder, reading.t_s, bits_of(reading.valid), frame, self._state, self._found, self._levels)
+        self._t_s[0], self._valid[0] = reading.t_s, bits_of(reading.valid)
+        self._frame[:] = reading.pressure_Pa, reading.zero_Pa
+        self._take()
         self.state, self.refusal = _STATES[self._state[0]], _REFUSALS[self._state[1]]
         if not self._state[2]:
             return None
