@@ -27,10 +27,11 @@ public:
 
 class LineSource {
 public:
+  static constexpr std::size_t LINE_MOST_bytes = 1 << 20; /* a longer one is damaged */
   struct Line {
     std::uint64_t number;                                     /* from 1; where lines are lost, the next one's */
     std::string text;                                         /* without its end */
-    bool torn;                                                /* the file ends within it */
+    bool torn;                                                /* the file ends within it, or it is too long */
     std::uint64_t left_out = 0;                               /* lines before it, which were not wanted */
     double time_s = std::numeric_limits<double>::quiet_NaN(); /* by the log time, since the recording began */
   };

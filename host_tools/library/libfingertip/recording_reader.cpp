@@ -134,7 +134,6 @@ public:
 
 private:
   static constexpr std::string_view BYTE_ORDER_MARK = "\xef\xbb\xbf";
-  static constexpr std::size_t LINE_MOST_bytes = 1 << 20; /* a longer one is read as torn */
 
   std::unique_ptr<ByteSource> bytes_;
   std::string block_;       /* the part of them that begins at begin_; read until at_ */
@@ -394,7 +393,7 @@ bool RecordingReader::read_next() {
   state_.line_number = line.number;
   try {
     if (line.torn && !trim(line.text).empty()) {
-      throw Damage{"a line is torn, or longer than a megabyte"};
+      throw Damage{line.text.size() > LineSource::LINE_MOST_bytes ? "the line is longer than a megabyte" : "the last line is torn"};
     }
     while (!line.text.empty() && line.text.back() == '\r') {
       line.text.pop_back(); /* of an MCAP file that was made of an editor's */

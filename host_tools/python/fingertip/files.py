@@ -602,7 +602,8 @@ def read_recording(
             reading.take_rows(wrong)
         try:
             if torn and text:
-                raise ValueError("a line is torn, or longer than a megabyte")
+                is_long = len(text) > recorded.LINE_MOST_bytes
+                raise ValueError("the line is longer than a megabyte" if is_long else "the last line is torn")
             reading.line(number, text)
         except ValueError as error:
             reading.take_rows(wrong)

@@ -163,7 +163,7 @@ class TestMcap(unittest.TestCase):
         lines = self.csv.read_bytes().splitlines(keepends=True)[:-1]
         torn.write_bytes(b"".join(lines)[:-5])
         refusal = self.refused("convert", torn, self.folder / "none.csv")
-        self.assertIn(f"torn.csv:{len(lines)}: a line is torn, or longer than a megabyte; use --salvage", refusal)
+        self.assertIn(f"torn.csv:{len(lines)}: the last line is torn; use --salvage", refusal)
         self.assertFalse((self.folder / "none.csv").exists())
         for out in ("out.csv", "out.mcap"):
             said = bags.call(FINGERTIP, "convert", torn, self.folder / out, "--salvage", "--overwrite").stderr

@@ -149,7 +149,7 @@ test('torn and foreign files: a sentence, and what came before', async () => {
   const damaged = Buffer.from(frames(packets).map((byte, i) => (i === 5000 ? byte ^ 2 || 3 : byte)));
   const row = lines.findIndex((line) => line.startsWith('t_us')) + 20;
   for (const [name, bytes, words, some] of [
-    ['torn.csv', csv.subarray(0, csv.length / 2), /:\d+: a line is torn/, true],
+    ['torn.csv', csv.subarray(0, csv.length / 2), /:\d+: the last line is torn/, true],
     ['cut.csv', text([...lines.slice(0, row), '']), /no end line/, true],
     ['later.csv', text(['# fingertip-recording 3', ...lines.slice(1)]), /format "3" is unknown.*use the page of that version/, false],
     ['torn.mcap', mcap.subarray(0, (2 * mcap.length) / 3), /the last chunk is torn/, false], // of two: the head's, and that of all rows
