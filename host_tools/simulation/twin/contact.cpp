@@ -17,7 +17,7 @@ constexpr double ROOM_THICKNESSES = 3.0;
 constexpr int STEPS_MAX = 2000;
 // Change of the pressure in one step, relative to the force.
 constexpr double SETTLED = 1e-7;
-// Of gaps, relative to the approach: a solution settles at 1e-6, rounding leaves 1e-15.
+// Of gaps, relative to the approach: solutions settle at some 1e-7, or, of few nodes, at rounding: 1e-15.
 constexpr double EVEN = 1e-12;
 
 Grid grid_for(const Indenter &indenter, const Layer &layer) {

@@ -19,7 +19,7 @@ public:
   static constexpr double FORCE_MIN_N = ForcePlanes::FORCE_MIN_N;
   static constexpr double FORCE_MAX_N = ForcePlanes::FORCE_MAX_N;
 
-  // From the cache if it holds this very table, else solved (some seconds at most) and kept there; a damaged file is solved again.
+  // From the cache if it holds this very table, else solved (a second) and kept there; a damaged file is solved again.
   // Throws std::filesystem::filesystem_error or std::runtime_error if the cache cannot be written.
   static ContactTable load_or_build(const Indenter &indenter, const Layer &layer, const std::filesystem::path &cache_directory);
 
