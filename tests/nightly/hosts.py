@@ -191,7 +191,7 @@ def cuts(fake_device, seconds):
         stdout, stderr = recorder.communicate()
         if not stdout:
             raise SystemExit(f"hosts.py: the recorder failed: {stderr.strip()[-500:]}")
-        told = json.loads(stdout)["fingertips"]
+        accounts = json.loads(stdout)["fingertips"]
         in_file = recorded_packets(recording)
         uncounted = strangers = sent = 0
         by_host = [0] * HOSTS
@@ -202,9 +202,9 @@ def cuts(fake_device, seconds):
             asked = of_device[first : truth.ends[serial]]
             sent += len(asked)
             strangers += len(set(of_file) - set(of_device)) + len(of_file) - len(set(of_file))
-            strangers += abs(len(of_file) - told[serial]["recorded"])
-            uncounted += abs(len(asked) - len(set(asked) & set(of_file)) - told[serial]["lost"])
-            by_host[int(serial[2])] += told[serial]["lost"]
+            strangers += abs(len(of_file) - accounts[serial]["recorded"])
+            uncounted += abs(len(asked) - len(set(asked) & set(of_file)) - accounts[serial]["lost"])
+            by_host[int(serial[2])] += accounts[serial]["lost"]
         return {
             "zenoh_sent": sent,
             "zenoh_recorded": sum(map(len, in_file.values())),
@@ -213,7 +213,7 @@ def cuts(fake_device, seconds):
             "zenoh_not_sent_but_recorded": strangers,
             "zenoh_lost_by_network": sum(by_host) - by_host[2],
             "zenoh_lost_by_killed_bridge": by_host[2],
-            "zenoh_restarts_missed": sum(abs(each["restarts"] - (serial == UNPLUGGED)) for serial, each in told.items()),
+            "zenoh_restarts_missed": sum(abs(each["restarts"] - (serial == UNPLUGGED)) for serial, each in accounts.items()),
         }
 
 

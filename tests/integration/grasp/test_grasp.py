@@ -84,9 +84,9 @@ class GraspTest(WorldCase):
 
     def until_state(self, process, state):
         """Lines of standard output up to the one that tells this state."""
-        return self.told(process, f" s  {state} ")
+        return self.lines_until(process, f" s  {state} ")
 
-    def told(self, process, words, limit_s=60):
+    def lines_until(self, process, words, limit_s=60):
         """The same, up to the line with these words, within so much of the world's time."""
         lines, end_s = [], self.world.now_s + limit_s
         while self.world.now_s < end_s and (line := process.readline()):
@@ -200,7 +200,7 @@ class Course(GraspTest):
             self.world.sleep(0.137)  # anywhere between two of its lines
             asked_s = self.world.now_s
             process.send_signal(signal.SIGINT)
-            lines = self.told(process, "Ctrl-C: the width stays; again: opens slowly")
+            lines = self.lines_until(process, "Ctrl-C: the width stays; again: opens slowly")
             self.assertLessEqual(self.world.now_s - asked_s, 0.1)
             self.assertIn(" s  still ", lines[-1])  # with the first line that tells of it
             width = self.steady()[0]
@@ -289,10 +289,10 @@ class Trouble(GraspTest):
         with self.cell():
             process = self.hold()
             self.tell("unplug left")
-            self.told(process, "left: no frames")
+            self.lines_until(process, "left: no frames")
             self.assert_stays()
             self.tell("unplug right")
-            self.told(process, "right: no frames")
+            self.lines_until(process, "right: no frames")
             self.world.sleep(0.5)
             self.tell("load 9")
             self.assert_stays()
@@ -328,7 +328,7 @@ class Trouble(GraspTest):
         with self.cell():
             process = self.hold()
             self.tell("unplug gripper")
-            self.told(process, "the gripper does not answer")
+            self.lines_until(process, "the gripper does not answer")
             _, err = self.finish(process, FAULT)
             self.assertRegex(err, "the gripper does not answer: .*gripper: (gone|no such port)")
 
@@ -372,7 +372,7 @@ class Trouble(GraspTest):
     def test_a_full_disk_ends_the_recording_and_not_the_grasp(self):
         with self.cell():
             process = self.holding("-o", self.csv, preexec_fn=disk_of(600000))
-            self.told(process, "not recorded any more")
+            self.lines_until(process, "not recorded any more")
             self.tell("load 2")
             self.world.until(lambda: self.tell()[1] > HOLDS_2_N)
             _, err = self.finish(process, 1)
