@@ -225,21 +225,9 @@ class Firmware(Library):
         reading_Pa [session, placement, sensor], NaN where a sensor has none. force_N: of each; fading: share of the readings
         that each loses in half a second; last: no placement follows."""
         sessions, _, sensors = reading_Pa.shape
-        found = (
-            self.made("calibration", sessions),
-            self.made("calibrated_sensor", sessions, sensors),
-            self.made("fit_deviation", sessions, sensors),
-        )
-        self.call(
-            "calibrate",
-            *(np.asarray(one, float) for one in (x_mm, y_mm)),
-            float(pitch_mm),
-            float(noise_Pa),
-            float(force_N),
-            int(last),
-            t_s,
-            reading_Pa,
-            np.zeros((0, 0)) if fading is None else fading,
-            *found,
-        )
+        shape = sessions, sensors
+        found = self.made("calibration", sessions), self.made("calibrated_sensor", *shape), self.made("fit_deviation", *shape)
+        numbers = float(pitch_mm), float(noise_Pa), float(force_N), int(last)
+        fading = np.zeros((0, 0)) if fading is None else fading
+        self.call("calibrate", np.asarray(x_mm, float), np.asarray(y_mm, float), *numbers, t_s, reading_Pa, fading, *found)
         return found

@@ -602,8 +602,7 @@ def read_recording(
             reading.take_rows(wrong)
         try:
             if torn and text:
-                is_long = len(text) > recorded.LINE_MOST_bytes
-                raise ValueError("the line is longer than a megabyte" if is_long else "the last line is torn")
+                raise ValueError("the line is longer than a megabyte" if len(text) > recorded.LINE_MOST_bytes else "the last line is torn")
             reading.line(number, text)
         except ValueError as error:
             reading.take_rows(wrong)

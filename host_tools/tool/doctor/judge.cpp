@@ -73,9 +73,7 @@ public:
     if (facts.info) {
       wiring_ = Wiring::of_board(text_field(facts.info->board));
       all_ = first_sensors(facts.info->sensor_count);
-    }
-    if (facts.after && facts.info) {
-      missing_ = all_ & ~facts.after->sensors_present;
+      missing_ = facts.after ? all_ & ~facts.after->sensors_present : 0;
     }
   }
 
