@@ -112,7 +112,7 @@ static __attribute__((noinline, cold)) void follow_moves(struct readings *readin
     sum_Pa += size_of(difference(kept_Pa_q10[k], readings->vouched_Pa_q10[k])) >> 10;
   }
   readings->moved = readings->moved || readings->jolted || (sum_Pa > READINGS_MOVED_Pa && readings->frames >= READINGS_MOVED_FRAMES);
-  readings->asks = readings->asks || readings->moved || (sum_Pa > READINGS_MOVED_Pa / 2 && readings->frames >= READINGS_ASK_FRAMES);
+  readings->asks |= readings->moved || (sum_Pa > READINGS_MOVED_Pa / 2 && readings->frames >= READINGS_ASK_FRAMES);
   if (readings->frames < READINGS_FRAMES_MAX) {
     readings->frames++;
   }

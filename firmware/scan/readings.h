@@ -2,7 +2,7 @@
  *
  * Temperatures. A value follows each sensor's, no faster than a pad warms (warmed_cC). A temperature that is READINGS_MOVED_cC from it is
  * not used, so that a supply that sags slowly is found as well. The last one stays in use, the sensor is doubtful, and the next one is
- * asked for at once: each degree is worth some 240 Pa. Two of them in a row come from a sensor that has lost its state, whatever the
+ * asked for at once: each degree is worth some 240 Pa. Two of them that agree come from a sensor that has lost its state, whatever the
  * others do. So does one after a jolt (see Moves). The sensor becomes a suspect. The first
  * temperature of a sensor must be near the others', but after a reset near its own last: it may have lost its state
  * again, and so may most others (supplies that dip once do so twice). If resets do not help for a second, and it reports
@@ -38,7 +38,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Temperatures before and after a reset, or after two that did not help: a sensor warms by less meanwhile. */
+/* Two temperatures of a sensor that has lost its state, or those before and after its reset: it warms by less meanwhile. */
 #define READINGS_TEMPERATURE_SAME_cC 100
 /* Sensors of one pad at rest: two parts of +-2 degC, and a warm object at one end. Further off,
  * a temperature must agree with a second one, no more. */

@@ -30,7 +30,7 @@ static int32_t find_middle(const int32_t value[], sensor_map which) {
 }
 
 /* Whether to use a temperature. */
-static __attribute__((noinline)) bool settle(struct readings *readings, uint8_t k, int32_t now_cC, int32_t middle_cC, int32_t warmed_cC) {
+static bool settle(struct readings *readings, uint8_t k, int32_t now_cC, int32_t middle_cC, int32_t warmed_cC) {
   sensor_map bit = sensor_bit(k);
   bool possible = now_cC >= TEMPERATURE_MIN_cC && now_cC <= TEMPERATURE_MAX_cC;
   bool near = possible && (middle_cC == NO_MIDDLE || within(now_cC - middle_cC, READINGS_TEMPERATURE_NEAR_cC));
@@ -46,7 +46,7 @@ static __attribute__((noinline)) bool settle(struct readings *readings, uint8_t 
     const int32_t beyond_cC = within(off_cC, warmed_cC) ? 0 : off_cC < 0 ? off_cC + warmed_cC : off_cC - warmed_cC;
     use = within(beyond_cC, READINGS_MOVED_cC);
     readings->steady_cC[k] = use ? now_cC - beyond_cC : readings->steady_cC[k];
-    insists = !use && ((readings->doubted & bit) || readings->jolted);
+    insists = !use && (agrees || readings->jolted);
     readings->has_last &= insists && readings->asks ? ~bit : ~(sensor_map)0; /* no evidence any more */
   }
   if (!use) {
