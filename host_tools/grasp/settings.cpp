@@ -19,7 +19,7 @@ constexpr double CAP_OVER_LEAST_FORCE = 1.05;
 constexpr double INTEGRAL_mm_N = 0.06, INTEGRAL_LEAST_mm_Ns = 0.3, INTEGRAL_MOST_mm_Ns = 4.0;
 constexpr double FINGERTIP_DELAY_s = 0.01; // from a measurement to the controller
 
-// A coarse gripper starts firmer, because its first grip may be one step short.
+// A gripper whose least move is long starts firmer: it answers late, and by too much.
 constexpr double START_N = 4.0, START_N_mm = 1.5;
 
 // Later it overshoots by half a step on average, so it needs a smaller floor and a smaller margin.
@@ -34,7 +34,7 @@ GripSettings default_settings(const GripperTraits &traits) {
   settings.release_width_mm = traits.stroke_mm;
   const double dead_s = traits.latency_s + traits.poll_s + FINGERTIP_DELAY_s;
   settings.ki_mm_Ns = std::clamp(INTEGRAL_mm_N / dead_s, INTEGRAL_LEAST_mm_Ns, INTEGRAL_MOST_mm_Ns);
-  settings.start_N = START_N + START_N_mm * traits.step_mm;
+  settings.start_N = START_N + START_N_mm * GripReach(traits).least_mm();
   settings.floor_N = std::max(FLOOR_N - FLOOR_N_mm * traits.step_mm, FLOOR_LEAST_N);
   settings.margin = std::max(MARGIN + MARGIN_1_s * traits.latency_s - MARGIN_1_mm * traits.step_mm, MARGIN_LEAST);
   return settings;
@@ -164,10 +164,9 @@ GripSettings settings_for(const GripperTraits &traits, const std::map<std::strin
   follow("start", settings.start_N, 0.0, cap_N, above_cap);
   follow("floor", settings.floor_N, 0.0, cap_N, above_cap);
   follow("blind", settings.blind_N, settings.start_N, cap_N, "it must lie between " + name_of("start") + " and " + name_of("cap"));
-  const double least_mm = GripReach(traits).least_mm();
-  const double step_N = GripBound::first_N(least_mm);
+  const double step_N = GripBound::first_N(traits.step_mm);
   if (step_N > cap_N) {
-    impossible("the least move of a " + traits.model + ", " + fixed(least_mm, 2) + " mm, may press with " + fixed(step_N, 1) +
+    impossible("a step of a " + traits.model + ", " + fixed(traits.step_mm, 2) + " mm, may press with " + fixed(step_N, 1) +
                " N, and the cap is " + fixed(cap_N, 1) + " N; take a gripper of finer steps, or a higher " + name_of("cap"));
   }
   return settings;

@@ -86,12 +86,10 @@ static GripTouch on_pad(GripTouch touch) {
 }
 
 static bool force_is_valid(const GripTouch &touch) {
-  if ((touch.flags & CONTACT_FLAG_CONTACT) == 0) {
-    return true; // the force is 0
-  }
+  const bool is_none = (touch.flags & CONTACT_FLAG_CONTACT) == 0; // the force is 0
   const bool is_long = (touch.flags & CONTACT_FLAG_ELONGATED) != 0 || touch.sigma_mm > WIDE_mm;
-  return (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 &&
-         (is_long || (touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 || touch.force_sd_N <= FORCE_SD_MOST * touch.force_N);
+  const bool is_sure = (touch.flags & CONTACT_FLAG_UNCERTAINTY_VALID) == 0 || touch.force_sd_N <= FORCE_SD_MOST * touch.force_N;
+  return is_none || ((touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (is_long || is_sure));
 }
 
 static bool is_same(const GripTouch &a, const GripTouch &b) {
@@ -104,11 +102,7 @@ void GripFinger::take(const GripTouch &touch) {
     return;
   }
   const bool has_fit = (touch.flags & CONTACT_FLAG_FIT_VALID) != 0 && (touch.flags & CONTACT_FLAG_HELD) == 0; // else values are 0
-  if (!is_heard_ || !has_fit || !is_same(came_, touch)) {
-    unchanged_ = 0;
-  } else {
-    unchanged_++;
-  }
+  unchanged_ = is_heard_ && has_fit && is_same(came_, touch) ? unchanged_ + 1 : 0;
   came_ = touch;
   touch_ = on_pad(touch);
   is_heard_ = is_new_ = true;

@@ -154,8 +154,15 @@ void Grip::approach() {
     enter(GRIP_SQUEEZE);
     return;
   }
-  const double speed_mm_s = std::min(settings_.approach_mm_s, OVERSHOOT_mm / dead_s());
-  ramp(least_mm, std::max(speed_mm_s, std::min(APPROACH_LEAST_mm_s, settings_.approach_mm_s)));
+  // Where a least move may exceed the cap, each step shows before the next.
+  if (!is_entered_ && GripBound::first_N(reach_.least_mm()) > settings_.cap_N) {
+    if (reach_.rests(now_s_, readings_.t_s) && reach_.target_mm() > least_mm) {
+      reach_.move_to(std::max(reach_.target_mm() - traits_.step_mm, least_mm), now_s_, true);
+    }
+  } else {
+    const double speed_mm_s = std::min(settings_.approach_mm_s, OVERSHOOT_mm / dead_s());
+    ramp(least_mm, std::max(speed_mm_s, std::min(APPROACH_LEAST_mm_s, settings_.approach_mm_s)));
+  }
   if (status_.moving || reach_.target_mm() != 0.0) {
     moved_s_ = now_s_;
   } else if (now_s_ - moved_s_ > CLOSED_s) {
@@ -185,9 +192,9 @@ std::uint32_t Grip::squeeze() {
       fixed ? fixed_.step(readings_, settings_, traits_, now_s_, reach_) : aim({risen_N, GripAim::Haste::patient, settings_.sets_force()});
   wanted_N_ = fixed ? settings_.set_N : wanted_N_;
   // A force as near to it as a move brings it is enough as well.
-  const bool nearest = !fixed && readings_.fingers > 0 && reach_.has_come(now_s_, readings_.t_s);
-  const bool there = (readings_.low_N >= SQUEEZED * aimed_N || nearest) && risen_N >= aimed_N;
-  const bool capped = (trouble & GRIP_AT_CAP) != 0 && reach_.has_come(now_s_, readings_.t_s);
+  const bool nearest = readings_.fingers > 0 && reach_.rests(now_s_, readings_.t_s);
+  const bool there = (readings_.low_N >= SQUEEZED * aimed_N || (!fixed && nearest)) && risen_N >= aimed_N;
+  const bool capped = (trouble & GRIP_AT_CAP) != 0 && nearest;
   const bool over = now_s_ - since_s_ > SQUEEZE_s;
   const double least_N = fixed ? settings_.touch_N : HALF * aimed_N;
   if (over && (alone || readings_.fingers == 0 || (readings_.low_N < least_N && !capped))) {
@@ -210,8 +217,7 @@ std::uint32_t Grip::squeeze() {
 }
 
 std::uint32_t Grip::make_ready() {
-  const std::uint32_t trouble = settings_.mode == GRIP_MODE_FIXED ? fixed_.step(readings_, settings_, traits_, now_s_, reach_)
-                                                                  : aim({start_force(), GripAim::Haste::patient, settings_.sets_force()});
+  const std::uint32_t trouble = settings_.mode == GRIP_MODE_FIXED ? fixed_.step(readings_, settings_, traits_, now_s_, reach_) : 0u;
   if (now_s_ - since_s_ >= READY_s && fingers_[0].has_zero() && fingers_[1].has_zero()) {
     for (GripFinger &finger : fingers_) {
       finger.end_zero();
@@ -243,7 +249,8 @@ std::uint32_t Grip::hold() {
   const bool slides = hold_.is_sliding();
   std::uint32_t trouble = readings_.has_load ? 0u : GRIP_NO_LOAD;
   const bool opens = readings_.has_load || hold_.is_set() || readings_.high_N > settings_.cap_N;
-  trouble |= aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual, hold_.is_set(), opens});
+  const bool stays = holds_ == GRIP_HANDING && !slides && readings_.high_N <= settings_.cap_N; // a pull changes the force either way
+  trouble |= stays ? 0u : aim({wanted_N, hold_.goes_on() ? GripAim::Haste::slides : GripAim::Haste::usual, hold_.is_set(), opens});
   if (slides != (state_ == GRIP_SLIPPING)) {
     enter(slides ? GRIP_SLIPPING : holds_);
   }
@@ -260,7 +267,8 @@ bool Grip::is_taken() {
 }
 
 bool Grip::is_gone() {
-  const bool empty = readings_.fingers > 0 && readings_.touches == 0;
+  const bool shows = state_ != GRIP_SQUEEZE || reach_.has_come(now_s_, readings_.t_s);
+  const bool empty = shows && readings_.fingers > 0 && readings_.touches == 0;
   filled_s_ = empty ? filled_s_ : now_s_;
   return empty && now_s_ - filled_s_ >= EMPTY_s;
 }
@@ -295,7 +303,7 @@ std::uint32_t Grip::go_on() {
 }
 
 void Grip::sample() {
-  const bool held = was_held_ && is_grasping();
+  const bool held = was_held_ && is_grasping() && state_ != GRIP_SQUEEZE;
   readings_ = combine_readings(fingers_, now_s_, settings_, held ? &reach_ : nullptr, place_);
   trouble_ = readings_.trouble | gripper_trouble();
   // The frames of the two are not simultaneous, so the forces always differ while they change.
@@ -308,23 +316,18 @@ void Grip::sample() {
 
 void Grip::fill(GripCommand &command) const {
   command = {};
-  command.width_mm = reach_.target_mm();
-  double speed_mm_s = traits_.speed_max_mm_s;
-  switch (state_) {
-  case GRIP_ACTIVATING: command.motion = may_activate_ ? GRIP_ACTIVATE : GRIP_STAY; return;
-  case GRIP_APPROACH: speed_mm_s = settings_.approach_mm_s; break;
-  case GRIP_RELEASE: speed_mm_s = settings_.release_mm_s; break;
-  case GRIP_SLIPPING: break;
-  case GRIP_SQUEEZE:
-  case GRIP_READY:
-  case GRIP_HOLDING:
-  case GRIP_PLACING:
-  case GRIP_HANDING: speed_mm_s = std::abs(reach_.target_mm() - status_.width_mm) / MOVE_s; break;
-  default: return;
+  command.width_mm = reach_.command_mm();
+  if (state_ == GRIP_ACTIVATING) {
+    command.motion = may_activate_ ? GRIP_ACTIVATE : GRIP_STAY;
   }
-  if ((trouble_ & (GRIP_GRIPPER_SILENT | GRIP_GRIPPER_FAULTS)) != 0) {
+  const bool moves = (state_ >= GRIP_APPROACH && state_ <= GRIP_HANDING) || state_ == GRIP_RELEASE;
+  if (!moves || (trouble_ & (GRIP_GRIPPER_SILENT | GRIP_GRIPPER_FAULTS)) != 0) {
     return;
   }
+  const double speed_mm_s = state_ == GRIP_APPROACH   ? settings_.approach_mm_s
+                            : state_ == GRIP_RELEASE  ? settings_.release_mm_s
+                            : state_ == GRIP_SLIPPING ? traits_.speed_max_mm_s
+                                                      : std::abs(command.width_mm - status_.width_mm) / MOVE_s;
   command.motion = GRIP_MOVE;
   command.speed_mm_s = std::clamp(speed_mm_s, traits_.speed_min_mm_s, traits_.speed_max_mm_s);
   command.force_N = std::clamp(GripReach::LIMIT * settings_.cap_N, traits_.force_min_N, traits_.force_max_N);

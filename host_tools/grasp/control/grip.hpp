@@ -51,10 +51,7 @@ private:
   std::uint32_t squeeze();
   std::uint32_t make_ready();
   std::uint32_t hold();
-  bool mark(double least_N) {
-    const bool left = fingers_[0].mark(least_N), right = fingers_[1].mark(least_N);
-    return left || right;
-  }
+  bool mark(double least_N) { return fingers_[0].mark(least_N) | fingers_[1].mark(least_N); }
   bool is_taken();
   // A slide in HANDING that goes with a pull.
   bool is_pulled() const { return readings_.pull_N > 0.5 * settings_.pull_N && (readings_.by_place || readings_.load_N > marked_N_); }

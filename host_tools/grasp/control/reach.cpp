@@ -113,6 +113,9 @@ void GripReach::take(const GripperStatus &status, double silent_s) {
   stopped_s_ = is_heard_ && !status_.moving ? stopped_s_ : t_s;
   status_ = status;
   is_heard_ = true;
+  if (backs_ && status.width_mm - target_mm_ > traits_.deadband_mm) {
+    backs_ = false, aimed_s_ = t_s;
+  }
   const double before_s = widths_[(newest_ + widths_.size() - 1) % widths_.size()].t_s;
   if (count_ < 2 || widths_[newest_].t_s - before_s >= SPACED_s) {
     newest_ = (newest_ + 1) % widths_.size();
@@ -170,11 +173,8 @@ bool GripReach::explains(double from_N, double from_s, double to_N, double to_s,
 // Whole steps to the position whose force is nearest. The least move is made when it reduces the error.
 double GripReach::nearest_steps(double off, double least_mm) const {
   const double least = std::round(least_mm / traits_.step_mm);
-  const double steps = std::abs(off) > OFF ? std::round(off) : 0.0;
-  if (std::abs(steps) >= least) {
-    return steps;
-  }
-  return std::abs(off) > 0.5 * least + OFF - 0.5 ? std::copysign(least, off) : 0.0;
+  const double steps = std::abs(off) > 0.5 * least + OFF - 0.5 ? std::max(std::round(std::abs(off)), least) : 0.0;
+  return std::copysign(steps, off);
 }
 
 void GripReach::learn(const GripReadings &readings, const GripSettings &settings, double now_s) {
@@ -200,7 +200,7 @@ GripReach::Outlook GripReach::predict(const GripAim &aim, const GripReadings &re
   outlook.coming_mm = coming_mm(now_s);
   outlook.come = has_come(now_s, readings.t_s);
   const bool at_rest = std::abs(outlook.coming_mm - status_.width_mm) < 1e-6;
-  outlook.least_mm = at_rest ? least_mm() : traits_.step_mm;
+  outlook.least_mm = at_rest && (aim.haste != Haste::patient || !can_back()) ? least_mm() : traits_.step_mm;
   outlook.coming_N = force_at(outlook, outlook.coming_mm);
   outlook.near_N = NEAR * aim.wanted_N;
   outlook.exact = aim.haste == Haste::slides || aim.exact;
@@ -220,7 +220,7 @@ double GripReach::closed_mm(const Outlook &outlook, const GripAim &aim, const Gr
   const double steps = aim.nearest ? outlook.nearest_steps : std::ceil(steps_to(outlook, aim.wanted_N - outlook.misses_N) - 1e-6);
   double way_mm = traits_.step_mm * steps;
   if (aim.haste == Haste::patient) {
-    way_mm = std::min(way_mm, whole_steps(SHORT_mm));
+    way_mm = std::min(way_mm, std::max(whole_steps(SHORT_mm), least_mm()));
   }
   way_mm = std::min(way_mm, whole_steps(outlook.coming_mm - rubber_.furthest_mm(outlook.width_mm)));
   way_mm = std::max(way_mm, outlook.least_mm);
@@ -258,7 +258,7 @@ std::uint32_t GripReach::aim(const GripAim &aim, const GripReadings &readings, c
   const bool patient = aim.haste == Haste::patient;
   // A gripper that cannot limit its own force moves only after the effect of its last move is measured.
   const bool may_move = limits_itself(settings) ? !patient || has_come(now_s, readings.t_s) : rests(now_s, readings.t_s);
-  if (!may_move) {
+  if (!may_move || (patient && readings.over)) {
     return trouble;
   }
   const Outlook outlook = predict(aim, readings, now_s);
@@ -268,9 +268,8 @@ std::uint32_t GripReach::aim(const GripAim &aim, const GripReadings &readings, c
   if (to_mm != outlook.coming_mm) {
     const double steps = std::round((to_mm - target_mm_) / traits_.step_mm);
     const double sent_mm = allowed(target_mm_ + steps * traits_.step_mm, readings, settings, trouble);
-    if (sent_mm != target_mm_) {
-      target_mm_ = sent_mm;
-      aimed_s_ = now_s;
+    if (patient ? sent_mm < outlook.coming_mm : sent_mm != target_mm_) {
+      move_to(sent_mm, now_s, patient);
     }
   }
   return trouble;

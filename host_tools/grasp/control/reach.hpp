@@ -41,8 +41,8 @@ private:
 class GripBound {
 public:
   // Force of one pad at 1 mm of indentation, assumed before a move of both pads has shown it. Round
-  // objects on 12 mm of rubber make 2 to 5 N, and one pad of two may be a tenth stiffer.
-  static constexpr double EXPECTED_N = 5.5;
+  // objects on 12 mm of rubber make 2 to 5 N, lines of 30 mm three times that.
+  static constexpr double EXPECTED_N = 12.0;
   static constexpr std::array<double, 2> EXPONENTS = {1.3, 1.9};
 
   // Upper bound of the force after a first move from where both pads touch.
@@ -92,8 +92,14 @@ public:
   double poll_s() const { return poll_s_; } // moving average of the time between two answers
   // The width that was last sent.
   double target_mm() const { return target_mm_; }
-  void send(double width_mm) { target_mm_ = width_mm; }
-  void stop() { target_mm_ = status_.width_mm; }
+  double command_mm() const { return backs_ ? target_mm_ + 2.0 * least_mm() - traits_.step_mm : target_mm_; }
+  void send(double width_mm) { target_mm_ = width_mm, backs_ = false; }
+  // may_back: it closes by less than the least move too, and opens before that.
+  void move_to(double width_mm, double now_s, bool may_back) {
+    target_mm_ = width_mm, aimed_s_ = now_s;
+    backs_ = may_back && status_.width_mm - width_mm < traits_.deadband_mm && can_back();
+  }
+  void stop() { send(status_.width_mm); }
   // The last move is complete, and this frame was measured after it.
   bool has_come(double now_s, double frame_s) const;
   // In addition, the gripper's own answers state that it was not moving when the frame was measured.
@@ -101,7 +107,7 @@ public:
   // The last move is complete.
   bool has_stopped(double now_s) const {
     const double late_s = std::max(now_s - status_.t_s(), 0.0);
-    return !status_.moving && status_.t_s() > aimed_s_ + traits_.latency_s + late_s + poll_s_;
+    return !status_.moving && !backs_ && status_.t_s() > aimed_s_ + traits_.latency_s + late_s + poll_s_;
   }
 
   // One fingertip touches at this width; both do. t_s: time of the frames that report it.
@@ -132,6 +138,7 @@ public:
   std::uint32_t aim(const GripAim &aim, const GripReadings &readings, const GripSettings &settings, double now_s);
 
 private:
+  bool can_back() const { return target_mm_ + 2.0 * least_mm() <= traits_.stroke_mm; }
   // The width at which the gripper will stop. At rest it makes no move shorter than its deadband.
   double coming_mm(double now_s) const {
     const bool stays = has_stopped(now_s) && std::abs(status_.width_mm - target_mm_) <= traits_.deadband_mm + 1e-9;
@@ -172,6 +179,7 @@ private:
   double target_mm_ = 0.0;
   double aimed_s_ = 0.0; // last change of target_mm_ for a force
   double poll_s_ = 0.0;
+  bool backs_ = false;     // opens before it closes to target_mm_
   double stopped_s_ = 0.0; // time of the first answer without motion since the last move
   struct Width {
     double t_s, width_mm;

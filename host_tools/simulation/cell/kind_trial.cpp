@@ -276,7 +276,7 @@ private:
     if (!failed.begun) {
       failed.begun = true;
       began_mm_ = width_mm();
-      failed.before_N = cell_->mean_N();
+      failed.before_N = outcome_.dropped ? 0.0 : cell_->mean_N();
       if (is_between_) {
         lift_s_ = std::min(lift_s_, t_s_ + LIFTS_AFTER_s);
       }

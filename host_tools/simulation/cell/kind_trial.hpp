@@ -69,7 +69,7 @@ struct GraspTrial {
 // Since a fault began.
 struct FaultOutcome {
   bool begun = false;
-  double before_N = 0.0, after_N = 0.0; // the grip when it began, the largest since
+  double before_N = 0.0, after_N = 0.0; // the grip when it began, 0: dropped by then; the largest since
   double opened_mm = 0.0;               // the fingers wider than when it began, at most, with the object between them
   std::uint32_t trouble = 0;            // all that was ever on
   std::uint8_t state = 0;               // at the end

@@ -21,7 +21,7 @@ TEST(Grip, TheTrueForceStaysBelowTheCap) {
       GripWorld world({{"cap", 10}}, gripper_traits(model));
       world.power = power;
       world.gain = {0.92, 0.92};
-      world.carry(9.0, 0.2, 2.0);
+      world.carry(16.0, 0.2, 2.0);
       EXPECT_LE(world.peak_N, 10.0) << model << " " << power;
       EXPECT_GT(world.peak_N, 5.0) << model << " " << power;
       EXPECT_LE(world.report.wanted_N, 10.0);
@@ -36,11 +36,12 @@ TEST(Grip, OneThatIsFrozenInTheAirNeverLeadsBeyondTheCap) {
       GripWorld world(fixed ? std::map<std::string, double>{{"cap", 4}, {"fixed", 3.5}} : std::map<std::string, double>{{"cap", 4}},
                       gripper_traits(model));
       world.gain[0] = 0.0;
+      world.object_mm = 55.0;
       ASSERT_TRUE(world.grip.request(GRIP_REQUEST_GRASP));
       world.run(6.0);
-      EXPECT_GT(world.peak_N, 1.0) << model;
+      EXPECT_GT(world.peak_N, fixed ? 0.5 : 1.0) << model;
       EXPECT_LT(world.peak_N, 4.0) << model << (fixed ? ", fixed" : "");
-      EXPECT_NE(world.report.trouble & GRIP_FINGERS_DIFFER, 0u) << model;
+      EXPECT_NE(world.report.trouble & (GRIP_FINGERS_DIFFER | GRIP_NO_GRIP), 0u) << model;
     }
   }
 }
@@ -101,8 +102,8 @@ TEST(Grip, ASlideNeverLeadsBeyondALowCap) {
     for (const double stiffness : {2.0, 2.5}) {
       GripWorld world({{"cap", 4.0}, {"start", 0.6}, {"floor", 0.5}}, gripper);
       world.stiffness = stiffness;
-      world.power = 1.85;
-      world.delay_s = 0.04;
+      world.power = 1.85, world.delay_s = 0.04;
+      world.object_mm = 55.0;
       world.grasp();
       world.pull(0.4, 0.1);
       world.slide(0.6, 30.0, 0.5);
@@ -115,7 +116,7 @@ TEST(Grip, ASlideNeverLeadsBeyondALowCap) {
 // How stiff the contact is, moves show that begin and end with both fingertips on the object.
 TEST(Grip, NoMoveExceedsALowCapWhereverTheFirstTouchIs) {
   for (const double off_mm : {0.0, 0.1}) {
-    for (const double stiffness : {2.0, 3.5, 5.5}) {
+    for (const double stiffness : {2.0, 3.5, off_mm == 0.0 ? 12.0 : 5.5}) {
       for (const double power : {1.3, 1.6, 1.9}) {
         for (double touch_mm = 0.0; touch_mm < 0.75; touch_mm += 0.05) {
           GripWorld world({{"cap", 2.4}, {"start", 1.0}, {"floor", 0.75}}, gripper_traits("2f85"));
@@ -124,17 +125,16 @@ TEST(Grip, NoMoveExceedsALowCapWhereverTheFirstTouchIs) {
           world.off_mm = off_mm;
           world.delay_s = 0.02;
           world.gain = {0.93, 0.93};
-          world.object_mm = 40.0 + touch_mm;
+          world.object_mm = 55.0 + touch_mm;
           ASSERT_TRUE(world.grip.request(GRIP_REQUEST_GRASP));
           world.run(5.0);
           world.pull(world.report.state == GRIP_HOLDING ? 0.6 : 0.0, 0.3);
           world.run(0.5);
-          const auto about =
-              std::to_string(stiffness) + " " + std::to_string(power) + " " + std::to_string(touch_mm) + " " + std::to_string(off_mm);
+          const std::string about = testing::PrintToString(std::array{stiffness, power, touch_mm, off_mm});
           EXPECT_LE(world.peak_N, 2.4) << about;
           if (off_mm == 0.0) { // one that does not give may leave no room for the other pad
             EXPECT_EQ(world.report.state, GRIP_HOLDING) << about;
-            EXPECT_GE(world.force_N, (world.report.trouble & GRIP_AT_CAP) != 0 ? 0.4 : 0.6) << about; // what is weaker says why
+            EXPECT_GE(world.force_N, (world.report.trouble & GRIP_AT_CAP) != 0 ? 0.4 : 0.55) << about; // what is weaker says why
           }
         }
       }

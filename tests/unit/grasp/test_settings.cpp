@@ -91,7 +91,7 @@ TEST(GraspSettings, PresetsStayWellBelowWhatBreaks) {
 }
 
 TEST(GraspSettings, AGripperWhoseStepExceedsTheCapIsRefused) {
-  EXPECT_NE(error_of(preset_values("crisp")).find("the least move of a 2f85, 0.75 mm"), std::string::npos);
+  EXPECT_NE(error_of(preset_values("crisp")).find("a step of a 2f85, 0.37 mm"), std::string::npos);
   EXPECT_EQ(error_of(preset_values("cup")), "");
   EXPECT_NO_THROW(settings_for(gripper_traits("sts3215"), preset_values("crisp")));
 }
