@@ -13,15 +13,15 @@
 
 enum { PAD_NORMAL_TERMS = 2, PAD_TANGENTIAL_TERMS = 3, PAD_EDGE_TERMS = 3 };
 
-/* The effect of the pad's ends on the estimate, which assumes none. It depends on the estimated
- * place (x, y). With u = x / PAD_EDGE_UNIT_mm and v = y / PAD_EDGE_UNIT_mm
+/* The effect of the pad's ends on the estimate, which assumes none; of a pad without end that of what the sums above
+ * miss of the layer. It depends on the estimated place (x, y). With u = x / PAD_EDGE_UNIT_mm and v = y / PAD_EDGE_UNIT_mm
  *   even(c) = c[0] + c[1] u^2 + c[2] v^2
  *   odd(c)  = u even(c) for values along x, v even(c) for values along y
  * An estimate of ratios q = Q / F, place and F then means
  *   q' = (q - odd(ratio)) / (1 + even(gain))
  *   place' = place - odd(place) - q' even(pull)
  *   F' = F / (1 + even(force))
- * All zeros: the pad has no ends. */
+ * All zeros: nothing is known of it. */
 struct pad_edges {
   float ratio_x[PAD_EDGE_TERMS], ratio_y[PAD_EDGE_TERMS];
   float gain_x[PAD_EDGE_TERMS], gain_y[PAD_EDGE_TERMS];

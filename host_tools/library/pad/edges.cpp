@@ -12,6 +12,7 @@ extern "C" {
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <vector>
 
 namespace fingertip::pad {
@@ -45,17 +46,35 @@ double layer_Pa(const pad_profile &profile, double qx, double qy, double dx_mm, 
   return 1e6 * sum;
 }
 
+// T(H) of profile.hpp once more, lengths in thicknesses: a foot's pressure within 0.003 % of its peak, as far as an array reaches.
+constexpr struct {
+  double share, sd;
+} LAYER[] = {{0.421452, 0.414599}, {0.064111, 0.291787}, {0.615403, 0.589985}, {-0.280032, 0.901322}, {0.16521, 1.894293}};
+
+// Pressure of a layer without end, per newton, with a foot so far away.
+double foot_Pa(double thickness_mm, double away_mm) {
+  double sum = 0.0;
+  for (const auto &[share, sd] : LAYER) {
+    const double v = sd * sd * thickness_mm * thickness_mm + FOOT_SPREAD_mm2;
+    sum += 1e6 * share / (2 * M_PI * v) * std::exp(-away_mm * away_mm / (2 * v));
+  }
+  return sum;
+}
+
+using Rubber = std::function<double(std::size_t sensor, const Contact &contact)>; // pressure, Pa
+
 class Estimate {
 public:
-  Estimate(const pad_profile &profile, const wire_info &info) : profile_(profile), info_(info) {
-    if (fit_array_init(&array_, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) != FT_OK ||
-        fit_pad_init(&pad_, &array_, &profile) != FT_OK) {
-      throw Error(ErrorCode::bad_value, "the fingertip's sensors are no rectangle that tangential force is estimated on");
-    }
+  Estimate(const pad_profile &profile, const wire_info &info)
+      : profile_(profile), info_(info),
+        is_usable_(fit_array_init(&array_, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) == FT_OK &&
+                   fit_pad_init(&pad_, &array_, &profile) == FT_OK) {
     settings_.iterations = 4;
     settings_.noise_Pa_q10 = 1024;
     std::fill_n(settings_.gain_sd_q16, FT_MAX_SENSORS, static_cast<std::uint16_t>(65536.0 * GAIN_SD));
   }
+
+  bool is_usable() const { return is_usable_; }
 
   // A calibration on this block takes what its ends lack for a dip. How deep, if that is as wide as all of its dip.
   void take_dip(const twin::BlockTable &block, const std::vector<twin::Place> &places) {
@@ -72,15 +91,26 @@ public:
     settings_.dip_share = static_cast<float>(std::clamp(products / squares, 0.0, info_.calibration.dip_share_q16 / 65536.0));
   }
 
+  // Those of contacts at the places, with this load, of which there is an estimate; none where half of them have none.
+  std::vector<Contact> contacts(const std::vector<twin::Place> &places, double qx, double qy, const Rubber &rubber) {
+    std::vector<Contact> found;
+    for (const auto &[x_mm, y_mm] : places) {
+      Contact contact{x_mm, y_mm, qx, qy, 0.0, 0.0, 0.0, 0.0, 0.0};
+      if (is_usable_ && of_contact(contact, rubber)) {
+        found.push_back(contact);
+      }
+    }
+    return 2 * found.size() < places.size() ? std::vector<Contact>{} : found;
+  }
+
+  double radius_mm() const { return std::sqrt(5.0 * of(profile_.spread_mm2)); } // under Hertz's pressure
+
+private:
   // False: there is no estimate.
-  bool of_contact(Contact &contact, const twin::BlockTable &block) {
+  bool of_contact(Contact &contact, const Rubber &rubber) {
     std::array<std::int32_t, FT_MAX_SENSORS> readings{};
     for (std::size_t k = 0; k < info_.sensor_count; k++) {
-      const double layer =
-          FORCE_N * layer_Pa(profile_, contact.qx, contact.qy, of(info_.x_mm[k]) - contact.x_mm, of(info_.y_mm[k]) - contact.y_mm);
-      const twin::BlockTable::Load load{FORCE_N, contact.qx * FORCE_N, contact.qy * FORCE_N, radius_mm()};
-      const double added = block.added_Pa(k, load, contact.x_mm, contact.y_mm);
-      readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * (layer + added)));
+      readings[k] = static_cast<std::int32_t>(std::lround(1024.0 * rubber(k, contact)));
     }
     fit_result fit;
     struct fit_tangential found;
@@ -100,14 +130,12 @@ public:
     return true;
   }
 
-private:
-  double radius_mm() const { return std::sqrt(5.0 * of(profile_.spread_mm2)); } // under Hertz's pressure
-
   const pad_profile &profile_;
   const wire_info &info_;
   fit_array array_{};
   struct fit_pad pad_ {};
   fit_settings settings_{};
+  bool is_usable_;
 };
 
 using Terms = Eigen::Vector3d;
@@ -127,7 +155,7 @@ template <typename Factor, typename Value> Terms fitted(const std::vector<Contac
     rows.row(row) = factor(contacts[i]) * row_at(contacts[i]).transpose();
     right[row] = value(contacts[i]);
   }
-  return rows.colPivHouseholderQr().solve(right);
+  return contacts.empty() ? Terms(Terms::Zero()) : Terms(rows.colPivHouseholderQr().solve(right));
 }
 
 double even(const Terms &c, const Contact &contact) { return c.dot(row_at(contact)); }
@@ -158,11 +186,40 @@ AxisTerms terms_along(const Axis &axis, const std::vector<Contact> &free, const 
   return terms;
 }
 
-void put(const Terms &terms, float (&to)[PAD_EDGE_TERMS]) { Eigen::Vector3f::Map(to) = terms.cast<float>(); }
-
 double outermost(const float *places, int count) { return of(*std::max_element(places, places + count)); }
 
+// All over the array, and so far beyond.
+std::vector<twin::Place> places_of(const wire_info &info, double beyond_mm) {
+  const double most_x_mm = outermost(info.x_mm, info.sensor_count) + beyond_mm,
+               most_y_mm = outermost(info.y_mm, info.sensor_count) + beyond_mm;
+  std::vector<twin::Place> places;
+  for (double x_mm = -most_x_mm; x_mm <= most_x_mm + 1e-9; x_mm += STEP_mm) {
+    for (double y_mm = -most_y_mm; y_mm <= most_y_mm + 1e-9; y_mm += STEP_mm) {
+      places.push_back({x_mm, y_mm});
+    }
+  }
+  return places;
+}
+
+pad_edges edges_from(const AxisTerms &x, const AxisTerms &y, const Terms &force) {
+  Eigen::Matrix<double, PAD_EDGE_TERMS, PAD_EDGE_KINDS> terms; // in the order of pad_edges, which is floats alone
+  terms << x.ratio, y.ratio, x.gain, y.gain, x.place, y.place, x.pull, y.pull, force;
+  const Eigen::Matrix<float, PAD_EDGE_TERMS, PAD_EDGE_KINDS> stored = terms.cast<float>();
+  pad_edges edges;
+  std::memcpy(&edges, stored.data(), sizeof edges);
+  return edges;
+}
+
 } // namespace
+
+pad_edges zero_of(const pad_profile &profile, const wire_info &info) {
+  Estimate estimate(profile, info);
+  const auto foot = [&](std::size_t k, const Contact &contact) {
+    return FORCE_N * foot_Pa(of(profile.thickness_mm), std::hypot(of(info.x_mm[k]) - contact.x_mm, of(info.y_mm[k]) - contact.y_mm));
+  };
+  const std::vector<Contact> free = estimate.contacts(places_of(info, 0.0), 0.0, 0.0, foot);
+  return free.empty() ? pad_edges{} : edges_from(terms_along(ALONG_X, free, {}), terms_along(ALONG_Y, free, {}), Terms::Zero());
+}
 
 pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std::filesystem::path &cache_directory,
                    const std::function<void(double)> &on_progress) {
@@ -173,59 +230,44 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std:
                                           shortest(profile.overhang_mm));
   }
   Estimate estimate(profile, info);
+  if (!estimate.is_usable()) {
+    throw Error(ErrorCode::bad_value, "the fingertip's sensors are no rectangle that tangential force is estimated on");
+  }
   const int count = info.sensor_count;
   const double half_x = outermost(info.x_mm, count), half_y = outermost(info.y_mm, count);
   std::vector<twin::Place> sensors;
   for (int k = 0; k < count; k++) {
     sensors.push_back({of(info.x_mm[k]), of(info.y_mm[k])});
   }
-  const twin::Block rubber{twin::silicone(of(profile.thickness_mm)), half_x + overhang_mm, half_y + overhang_mm};
-  const twin::BlockTable block = twin::BlockTable::load_or_build(rubber, sensors, cache_directory, on_progress);
-  std::vector<twin::Place> places;
-  const double beyond_mm = overhang_mm < 6.0 * BEYOND_mm ? 0.0 : BEYOND_mm; // where ends are nearer it costs too much inside
-  for (double x_mm = -half_x - beyond_mm; x_mm <= half_x + beyond_mm + 1e-9; x_mm += STEP_mm) {
-    for (double y_mm = -half_y - beyond_mm; y_mm <= half_y + beyond_mm + 1e-9; y_mm += STEP_mm) {
-      places.push_back({x_mm, y_mm});
-    }
-  }
+  const twin::Block own{twin::silicone(of(profile.thickness_mm)), half_x + overhang_mm, half_y + overhang_mm};
+  const twin::BlockTable block = twin::BlockTable::load_or_build(own, sensors, cache_directory, on_progress);
+  // Beyond the sensors it costs too much inside where ends are nearer.
+  const std::vector<twin::Place> places = places_of(info, overhang_mm < 6.0 * BEYOND_mm ? 0.0 : BEYOND_mm);
   const bool calibrated = (info.stored & WIRE_STORED_CALIBRATION) != 0;
   if (calibrated && info.calibration.dip_share_q16 > 0) {
     estimate.take_dip(block, places);
   }
-  std::vector<Contact> contacts[3]; // without load, pulled along x, along y
-  for (const auto &[x_mm, y_mm] : places) {
-    for (int load = 0; load < 3; load++) {
-      Contact contact{x_mm, y_mm, load == 1 ? RATIO : 0.0, load == 2 ? RATIO : 0.0, 0.0, 0.0, 0.0, 0.0, 0.0};
-      if (estimate.of_contact(contact, block)) {
-        contacts[load].push_back(contact);
-      }
-    }
+  const auto rubber = [&](std::size_t k, const Contact &c) {
+    const twin::BlockTable::Load load{FORCE_N, c.qx * FORCE_N, c.qy * FORCE_N, estimate.radius_mm()};
+    return FORCE_N * layer_Pa(profile, c.qx, c.qy, of(info.x_mm[k]) - c.x_mm, of(info.y_mm[k]) - c.y_mm) +
+           block.added_Pa(k, load, c.x_mm, c.y_mm);
+  };
+  const std::vector<Contact> free = estimate.contacts(places, 0.0, 0.0, rubber);
+  const std::vector<Contact> along_x = estimate.contacts(places, RATIO, 0.0, rubber),
+                             along_y = estimate.contacts(places, 0.0, RATIO, rubber);
+  if (free.empty() || along_x.empty() || along_y.empty()) {
+    throw Error(ErrorCode::bad_value, "the rubber ends " + shortest(profile.overhang_mm) +
+                                          " mm beyond the outer sensors, too near to estimate a tangential force");
   }
-  for (const auto &some : contacts) {
-    if (2 * some.size() < places.size()) {
-      throw Error(ErrorCode::bad_value, "the rubber ends " + shortest(profile.overhang_mm) +
-                                            " mm beyond the outer sensors, too near to estimate a tangential force");
-    }
-  }
-  const AxisTerms x = terms_along(ALONG_X, contacts[0], contacts[1]);
-  const AxisTerms y = terms_along(ALONG_Y, contacts[0], contacts[2]);
+  const AxisTerms x = terms_along(ALONG_X, free, along_x);
+  const AxisTerms y = terms_along(ALONG_Y, free, along_y);
   Terms force = fitted(
-      contacts[0], [](const Contact &) { return 1.0; }, [](const Contact &c) { return c.estimated_force - 1.0; });
+      free, [](const Contact &) { return 1.0; }, [](const Contact &c) { return c.estimated_force - 1.0; });
   if (calibrated) { // in its scale, that of placements all over the array
     const double u = half_x / of(PAD_EDGE_UNIT_mm), v = half_y / of(PAD_EDGE_UNIT_mm);
     force = (force + Terms::UnitX()) / (1.0 + force.dot(Terms(1.0, u * u / 3.0, v * v / 3.0))) - Terms::UnitX();
   }
-  pad_edges edges{};
-  put(x.ratio, edges.ratio_x);
-  put(y.ratio, edges.ratio_y);
-  put(x.gain, edges.gain_x);
-  put(y.gain, edges.gain_y);
-  put(x.place, edges.place_x_mm);
-  put(y.place, edges.place_y_mm);
-  put(x.pull, edges.pull_x_mm);
-  put(y.pull, edges.pull_y_mm);
-  put(force, edges.force);
-  return edges;
+  return edges_from(x, y, force);
 }
 
 } // namespace fingertip::pad

@@ -2,6 +2,7 @@
 
 #include "libfingertip/error.hpp"
 #include "libfingertip/text.hpp"
+#include "library/pad/edges.hpp"
 
 extern "C" {
 #include "config/geometry.h"
@@ -82,9 +83,7 @@ void check(const char *what, double value, double least, double greatest) {
   }
 }
 
-// Variance of the foot's pressure along an axis, mm^2: a^2 / 5 of a disc of radius a under Hertz's pressure. A sphere
-// of 15 mm under 1 to 6 N makes 2.1 to 3.5 mm on the twin's silicone: 0.8 to 2.5 mm^2, and more on softer rubber.
-constexpr double SPREAD_mm2 = 2.0, SPREAD_SD_mm2 = 1.5;
+constexpr double SPREAD_SD_mm2 = 1.5; // of FOOT_SPREAD_mm2
 // Sessions of the twin with memories, a dip, sensors off their places: their widths differ so (unit.pad_thickness).
 constexpr double SESSION_SD = 0.02;
 constexpr double AGREES_SDS = 2.0;
@@ -153,6 +152,7 @@ pad_profile profile_of(const Shape &shape, const wire_info &info) {
   profile.tangential_scale = 1;
   profile.tangential_scale_sd = 0.1F;
   profile.from_touch = shape.from_touch ? 1 : 0;
+  profile.edges = zero_of(profile, info);
   return profile;
 }
 
@@ -170,11 +170,11 @@ pad_profile profile_over_own_sensors(const Shape &shape) { return profile_of(sha
 bool edges_spoil_the_zero(const Shape &shape) { return shape.overhang_mm > 0 && shape.overhang_mm < 0.5 * shape.thickness_mm; }
 
 Thickness thickness_of(double sigma_mm, double sigma_sd_mm) {
-  const double mm = thickness_mm_of(sigma_mm, SPREAD_mm2);
+  const double mm = thickness_mm_of(sigma_mm, FOOT_SPREAD_mm2);
   const double by_spread =
-      0.5 * (thickness_mm_of(sigma_mm, SPREAD_mm2 - SPREAD_SD_mm2) - thickness_mm_of(sigma_mm, SPREAD_mm2 + SPREAD_SD_mm2));
+      0.5 * (thickness_mm_of(sigma_mm, FOOT_SPREAD_mm2 - SPREAD_SD_mm2) - thickness_mm_of(sigma_mm, FOOT_SPREAD_mm2 + SPREAD_SD_mm2));
   const double sd_mm = std::hypot(sigma_sd_mm, SESSION_SD * sigma_mm);
-  const double by_width = thickness_mm_of(sigma_mm + sd_mm, SPREAD_mm2) - mm;
+  const double by_width = thickness_mm_of(sigma_mm + sd_mm, FOOT_SPREAD_mm2) - mm;
   return {mm, std::hypot(by_spread, by_width)};
 }
 
