@@ -45,7 +45,7 @@ LIMITS = {
     "page_codec_lines": (0, 0),
     "longest_file": (700, 700),
     "readme_words": (600, 600),
-    "product_lines": (104235, 104235),
+    "product_lines": (104191, 104191),
     "test_lines": (61698, 61698),
     "grasp_lines": (11000, 11000),
     "private_words": (9, 9),

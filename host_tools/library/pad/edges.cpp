@@ -65,16 +65,15 @@ using Rubber = std::function<double(std::size_t sensor, const Contact &contact)>
 
 class Estimate {
 public:
-  Estimate(const pad_profile &profile, const wire_info &info)
-      : profile_(profile), info_(info),
-        is_usable_(fit_array_init(&array_, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) == FT_OK &&
-                   fit_pad_init(&pad_, &array_, &profile) == FT_OK) {
+  Estimate(const pad_profile &profile, const wire_info &info) : profile_(profile), info_(info) {
+    if (fit_array_init(&array_, info.sensor_count, info.x_mm, info.y_mm, info.pitch_mm) != FT_OK ||
+        fit_pad_init(&pad_, &array_, &profile) != FT_OK) {
+      throw Error(ErrorCode::bad_value, "the fingertip's sensors are no rectangle that tangential force is estimated on");
+    }
     settings_.iterations = 4;
     settings_.noise_Pa_q10 = 1024;
     std::fill_n(settings_.gain_sd_q16, FT_MAX_SENSORS, static_cast<std::uint16_t>(65536.0 * GAIN_SD));
   }
-
-  bool is_usable() const { return is_usable_; }
 
   // A calibration on this block takes what its ends lack for a dip. How deep, if that is as wide as all of its dip.
   void take_dip(const twin::BlockTable &block, const std::vector<twin::Place> &places) {
@@ -96,7 +95,7 @@ public:
     std::vector<Contact> found;
     for (const auto &[x_mm, y_mm] : places) {
       Contact contact{x_mm, y_mm, qx, qy, 0.0, 0.0, 0.0, 0.0, 0.0};
-      if (is_usable_ && of_contact(contact, rubber)) {
+      if (of_contact(contact, rubber)) {
         found.push_back(contact);
       }
     }
@@ -135,7 +134,6 @@ private:
   fit_array array_{};
   struct fit_pad pad_ {};
   fit_settings settings_{};
-  bool is_usable_;
 };
 
 using Terms = Eigen::Vector3d;
@@ -212,13 +210,15 @@ pad_edges edges_from(const AxisTerms &x, const AxisTerms &y, const Terms &force)
 
 } // namespace
 
-pad_edges zero_of(const pad_profile &profile, const wire_info &info) {
+pad_edges zero_of(const pad_profile &profile, const wire_info &info) try {
   Estimate estimate(profile, info);
   const auto foot = [&](std::size_t k, const Contact &contact) {
     return FORCE_N * foot_Pa(of(profile.thickness_mm), std::hypot(of(info.x_mm[k]) - contact.x_mm, of(info.y_mm[k]) - contact.y_mm));
   };
   const std::vector<Contact> free = estimate.contacts(places_of(info, 0.0), 0.0, 0.0, foot);
   return free.empty() ? pad_edges{} : edges_from(terms_along(ALONG_X, free, {}), terms_along(ALONG_Y, free, {}), Terms::Zero());
+} catch (const Error &) { // nothing is estimated on these sensors
+  return {};
 }
 
 pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std::filesystem::path &cache_directory,
@@ -230,9 +230,6 @@ pad_edges edges_of(const pad_profile &profile, const wire_info &info, const std:
                                           shortest(profile.overhang_mm));
   }
   Estimate estimate(profile, info);
-  if (!estimate.is_usable()) {
-    throw Error(ErrorCode::bad_value, "the fingertip's sensors are no rectangle that tangential force is estimated on");
-  }
   const int count = info.sensor_count;
   const double half_x = outermost(info.x_mm, count), half_y = outermost(info.y_mm, count);
   std::vector<twin::Place> sensors;

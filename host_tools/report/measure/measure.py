@@ -27,17 +27,7 @@ class Measure(Firmware):
         found = tuple(self.made(name, *frames.shape) for name in ("conditioned", "fit_result", "contact_result"))
         none = self.made("condition_gains", 0)
         before = self.made("frame", 0) if before is None else before
-        self.call(
-            "chain",
-            array,
-            settings,
-            deviations,
-            contacts,
-            none if gains is None else gains,
-            before,
-            frames,
-            *found,
-        )
+        self.call("chain", array, settings, deviations, contacts, none if gains is None else gains, before, frames, *found)
         return found
 
     def osr(self, osr):

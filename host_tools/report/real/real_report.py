@@ -22,11 +22,7 @@ def draw_profile(axes, shown):
         axes.plot(middle, 100 * np.array(mean), lw=1.1, label=key)
     axes.plot(middle, 100 * np.exp(-(middle**2) / 2), color=INK, lw=1, ls=":", label="Gaussian")
     axes.axhline(0, color=FAINT, lw=0.6)
-    axes.set(
-        title="Response: the dip three to five widths away",
-        xlabel="distance / width",
-        ylabel="% of the peak, symmetric log",
-    )
+    axes.set(title="Response: the dip three to five widths away", xlabel="distance / width", ylabel="% of the peak, symmetric log")
     axes.set_yscale("symlog", linthresh=5)
     axes.legend(fontsize=7)
 

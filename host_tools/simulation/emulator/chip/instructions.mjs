@@ -303,11 +303,8 @@ export function execute(core, stop, time) {
             const top = (r[13] - 4 * count) | 0;
             const at = (top - RAM_BASE) | 0;
             // All of it in SRAM, above what is not to be written and on one side of the guard.
-            isOthers =
-              (at & 3) !== 0 ||
-              at < readOnlyBytes ||
-              at + 4 * count > RAM_BYTES ||
-              (at + 4 * count > guardFrom && at < guardFrom + guardBytes);
+            const end = at + 4 * count;
+            isOthers = (at & 3) !== 0 || at < readOnlyBytes || end > RAM_BYTES || (end > guardFrom && at < guardFrom + guardBytes);
             if (isOthers) break;
             let word = at >>> 2;
             for (let rest = op & 0xff; rest; rest &= rest - 1) ram32[word++] = r[31 - Math.clz32(rest & -rest)];
@@ -346,11 +343,8 @@ export function execute(core, stop, time) {
           const n = (op >>> 8) & 7;
           const count = bitCount(op & 0xff);
           const at = (r[n] - RAM_BASE) | 0;
-          isOthers =
-            (at & 3) !== 0 ||
-            at < readOnlyBytes ||
-            at + 4 * count > RAM_BYTES ||
-            (at + 4 * count > guardFrom && at < guardFrom + guardBytes);
+          const end = at + 4 * count;
+          isOthers = (at & 3) !== 0 || at < readOnlyBytes || end > RAM_BYTES || (end > guardFrom && at < guardFrom + guardBytes);
           if (isOthers) break;
           let word = at >>> 2;
           for (let rest = op & 0xff; rest; rest &= rest - 1) ram32[word++] = r[31 - Math.clz32(rest & -rest)];
@@ -374,33 +368,12 @@ export function execute(core, stop, time) {
         case 26:
         case 27: {
           // B conditional
-          let isTaken;
-          switch ((op >>> 9) & 7) {
-            case 0:
-              isTaken = zero === 0;
-              break;
-            case 1:
-              isTaken = carry !== 0;
-              break;
-            case 2:
-              isTaken = negative < 0;
-              break;
-            case 3:
-              isTaken = overflow < 0;
-              break;
-            case 4:
-              isTaken = carry !== 0 && zero !== 0;
-              break;
-            case 5:
-              isTaken = (negative ^ overflow) >= 0;
-              break;
-            case 6:
-              isTaken = (negative ^ overflow) >= 0 && zero !== 0;
-              break;
-            default:
-              isOthers = true;
-          }
+          const kind = (op >>> 9) & 7;
+          isOthers = kind === 7;
           if (isOthers) break;
+          let isTaken = kind === 0 ? zero === 0 : kind === 1 ? carry !== 0 : kind === 2 ? negative < 0 : overflow < 0;
+          if (kind === 4) isTaken = carry !== 0 && zero !== 0;
+          else if (kind > 4) isTaken = (negative ^ overflow) >= 0 && (kind === 5 || zero !== 0);
           if (isTaken !== ((op & 0x100) !== 0)) {
             pc += 4 + ((op << 24) >> 23);
             cycles += 2;
