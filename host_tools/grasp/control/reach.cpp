@@ -113,9 +113,9 @@ void GripReach::take(const GripperStatus &status, double silent_s) {
   stopped_s_ = is_heard_ && !status_.moving ? stopped_s_ : t_s;
   status_ = status;
   is_heard_ = true;
-  if (backs_ && status.width_mm - target_mm_ > traits_.deadband_mm) {
-    backs_ = false, aimed_s_ = t_s;
-  }
+  const bool is_back = backs_ && status.width_mm - target_mm_ > traits_.deadband_mm;
+  aimed_s_ = is_back ? t_s : aimed_s_;
+  backs_ = backs_ && !is_back;
   const double before_s = widths_[(newest_ + widths_.size() - 1) % widths_.size()].t_s;
   if (count_ < 2 || widths_[newest_].t_s - before_s >= SPACED_s) {
     newest_ = (newest_ + 1) % widths_.size();

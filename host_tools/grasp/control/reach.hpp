@@ -89,14 +89,14 @@ public:
     return count_ > 0 && widths_[oldest].t_s <= t_s;
   }
   double width_at(double t_s) const;
-  double poll_s() const { return poll_s_; } // moving average of the time between two answers
-  // The width that was last sent.
-  double target_mm() const { return target_mm_; }
+  double poll_s() const { return poll_s_; }       // moving average of the time between two answers
+  double target_mm() const { return target_mm_; } // where the last move ends
   double command_mm() const { return backs_ ? target_mm_ + 2.0 * least_mm() - traits_.step_mm : target_mm_; }
-  void send(double width_mm) { target_mm_ = width_mm, backs_ = false; }
+  void send(double width_mm) { move_to(width_mm, aimed_s_, false); }
   // may_back: it closes by less than the least move too, and opens before that.
   void move_to(double width_mm, double now_s, bool may_back) {
-    target_mm_ = width_mm, aimed_s_ = now_s;
+    target_mm_ = width_mm;
+    aimed_s_ = now_s;
     backs_ = may_back && status_.width_mm - width_mm < traits_.deadband_mm && can_back();
   }
   void stop() { send(status_.width_mm); }
