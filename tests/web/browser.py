@@ -25,7 +25,7 @@ FLAGS = """
 --headless --no-sandbox --remote-debugging-pipe --no-first-run --no-default-browser-check
 --disable-extensions --disable-background-networking --disable-component-update --disable-sync --disable-default-apps
 --disable-breakpad --disable-dev-shm-usage --mute-audio --hide-scrollbars --force-color-profile=srgb
---force-device-scale-factor=1
+--force-device-scale-factor=1 --disable-renderer-backgrounding --disable-backgrounding-occluded-windows
 """.split()
 AXE = pathlib.Path(__file__).resolve().parents[2] / "host_tools/web/node_modules/axe-core/axe.min.js"
 START = 'mount --bind "$1" "$2" && shift 2 && exec "$@" 3<&"$FROM_TEST" 4>&"$TO_TEST"'
