@@ -61,9 +61,8 @@ class Distribution(unittest.TestCase):
 
     def test_in_a_clean_environment(self):
         clean = self.folder / "clean"
-        run("/usr/bin/python3", "-m", "venv", "--without-pip", clean)
-        pip = [sys.executable, *"-m pip --disable-pip-version-check --python".split(), clean / "bin/python"]
-        run(*pip, "install", "--no-index", "--no-deps", self.wheel)
+        run("/usr/bin/python3", "-m", "venv", clean)
+        run(clean / "bin/python", *"-m pip --disable-pip-version-check".split(), "install", "--no-index", "--no-deps", self.wheel)
         (site,) = clean.glob("lib/python3*/site-packages")
         for module in ("numpy", "serial"):  # what pip would fetch
             place = pathlib.Path(run(sys.executable, "-c", f"import {module}; print({module}.__file__)").strip()).parent
