@@ -25,8 +25,8 @@ from fingertip.command import InputError, run_tool  # noqa: E402
 from presentation import judge  # noqa: E402
 from reporting import Steps, option_parser, output_folder, publish  # noqa: E402
 
-SEED = 27001  # seen by no choice of a constant
-CHOSE = (5001, 7001, 7101, 7201, 9001, 9101, 11001, 11101, 13001, 15001, 15101, 18001, 18101, 50001)  # and all below 1000
+SEED = 47001  # seen by no choice of a constant
+CHOSE = (5001, 7001, 7101, 7201, 9001, 9101, 11001, 11101, 13001, 15001, 15101, 18001, 18101, 27001, 50001)  # and all below 1000
 FAULTS = ("faults_opened", "faults_beyond_cap", "faults_unsaid", "cups_crushed")
 GOALS = (*kinds.GOALS, ("emulated_reaction_ms", "<=", 60), *((name, "<=", 0) for name in FAULTS))
 
