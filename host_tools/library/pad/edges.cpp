@@ -46,19 +46,15 @@ double layer_Pa(const pad_profile &profile, double qx, double qy, double dx_mm, 
   return 1e6 * sum;
 }
 
-// T(H) of profile.hpp once more, lengths in thicknesses: a foot's pressure within 0.003 % of its peak, as far as an array reaches.
-constexpr struct {
-  double share, sd;
-} LAYER[] = {{0.421452, 0.414599}, {0.064111, 0.291787}, {0.615403, 0.589985}, {-0.280032, 0.901322}, {0.16521, 1.894293}};
-
-// Pressure of a layer without end, per newton, with a foot so far away.
-double foot_Pa(double thickness_mm, double away_mm) {
+// The same without a load, of the layer itself, wave by wave (layer.hpp), with a foot so far away: within 1e-6 of its peak.
+double foot_Pa(const twin::Layer &layer, double away_mm) {
+  constexpr double STEP = 0.05, MOST = 4.5; // of the root of wave number times thickness
   double sum = 0.0;
-  for (const auto &[share, sd] : LAYER) {
-    const double v = sd * sd * thickness_mm * thickness_mm + FOOT_SPREAD_mm2;
-    sum += 1e6 * share / (2 * M_PI * v) * std::exp(-away_mm * away_mm / (2 * v));
+  for (double root = 0.5 * STEP; root < MOST; root += STEP) {
+    const double H = root * root, k = H / layer.thickness_mm;
+    sum += root * k * twin::base_transfer(H, layer.poisson) * std::exp(-0.5 * FOOT_SPREAD_mm2 * k * k) * j0(k * away_mm);
   }
-  return sum;
+  return 1e6 * sum * STEP / (M_PI * layer.thickness_mm);
 }
 
 using Rubber = std::function<double(std::size_t sensor, const Contact &contact)>; // pressure, Pa
@@ -212,8 +208,9 @@ pad_edges edges_from(const AxisTerms &x, const AxisTerms &y, const Terms &force)
 
 pad_edges zero_of(const pad_profile &profile, const wire_info &info) try {
   Estimate estimate(profile, info);
+  const twin::Layer layer = twin::silicone(of(profile.thickness_mm));
   const auto foot = [&](std::size_t k, const Contact &contact) {
-    return FORCE_N * foot_Pa(of(profile.thickness_mm), std::hypot(of(info.x_mm[k]) - contact.x_mm, of(info.y_mm[k]) - contact.y_mm));
+    return FORCE_N * foot_Pa(layer, std::hypot(of(info.x_mm[k]) - contact.x_mm, of(info.y_mm[k]) - contact.y_mm));
   };
   const std::vector<Contact> free = estimate.contacts(places_of(info, 0.0), 0.0, 0.0, foot);
   return free.empty() ? pad_edges{} : edges_from(terms_along(ALONG_X, free, {}), terms_along(ALONG_Y, free, {}), Terms::Zero());
